@@ -1,0 +1,92 @@
+// Fetches the world-space vertices of any triangle of the scene, one triangle per lane.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_TRIANGLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_TRIANGLE_INL_H_
+#undef CARPOOL_STAGES_KERNELS_TRIANGLE_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_TRIANGLE_INL_H_
+#endif
+
+#include <cstddef>
+
+#include "stages/simd/lanes-inl.h"
+#include "stages/tables/geometry_view.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// World space, relative to `SceneTables::origin`; in the order of the index stream.
+template <class D>
+struct Triangle {
+  Vec3<D> p0, p1, p2;
+  Mask<D> mirrored;  // the placement's transform turns the winding over
+};
+
+/// Vertex numbers (within the shape) of triangle `primitive` of `placement`.
+template <class D>
+struct TriangleIndices {
+  Int<D> i0, i1, i2;
+};
+
+template <class D>
+HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& view,
+                                                    Int<D> placement, Int<D> primitive) {
+  const IntTag<D> di;
+  const Int<D> first =
+      FieldInt(d, view.placements, placement, offsetof(Placement, first_index)) +
+      primitive * hn::Set(di, 3);
+  return {GatherInt(d, view.indices, first), GatherInt(d, view.indices, first + hn::Set(di, 1)),
+          GatherInt(d, view.indices, first + hn::Set(di, 2))};
+}
+
+/// A point of object space through the placement's object_to_world.
+template <class D>
+HWY_INLINE Vec3<D> PlacementToWorld(D d, const GeometryView& view, Int<D> placement,
+                                    const Vec3<D>& p) {
+  const auto row = [&](size_t i) HWY_ATTR {
+    const size_t at = offsetof(Placement, object_to_world) + 16 * i;
+    const Vec3<D> axes = FieldVec3(d, view.placements, placement, at);
+    return Dot(axes, p) + FieldReal(d, view.placements, placement, at + 12);
+  };
+  return {row(0), row(1), row(2)};
+}
+
+/// The triangle's vertices in world space. Every lane needs a valid placement and primitive.
+template <class D>
+HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view, Int<D> placement,
+                                        Int<D> primitive) {
+  const IntTag<D> di;
+  const TriangleIndices<D> index = GatherTriangleIndices(d, view, placement, primitive);
+  const Int<D> base = FieldInt(d, view.placements, placement, offsetof(Placement, positions));
+  const auto vertex = [&](Int<D> i) HWY_ATTR {
+    return GatherVec3(d, view.floats, base + i * hn::Set(di, 3));
+  };
+  Vec3<D> p0 = vertex(index.i0), p1 = vertex(index.i1), p2 = vertex(index.i2);
+
+  const Int<D> flags = FieldInt(d, view.placements, placement, offsetof(Placement, flags));
+  const auto has = [&](int32_t flag) HWY_ATTR {
+    return hn::RebindMask(d, hn::TestBit(flags, hn::Set(di, flag)));
+  };
+  const Mask<D> instanced = has(kPlacementInstanced);
+  if (!hn::AllFalse(d, instanced)) {
+    // Flat lanes keep their vertices: going through an identity would cost them a rounding of -0.
+    p0 = Select<D>(instanced, PlacementToWorld(d, view, placement, p0), p0);
+    p1 = Select<D>(instanced, PlacementToWorld(d, view, placement, p1), p1);
+    p2 = Select<D>(instanced, PlacementToWorld(d, view, placement, p2), p2);
+  }
+  return {p0, p1, p2, has(kPlacementMirrored)};
+}
+
+/// Twice the triangle's area times its geometric normal, on the side that glTF calls the front.
+template <class D>
+HWY_INLINE Vec3<D> TriangleAreaNormal(const Triangle<D>& t) {
+  const Vec3<D> n = Cross<D>(Sub<D>(t.p1, t.p0), Sub<D>(t.p2, t.p0));
+  return Select<D>(t.mirrored, Neg<D>(n), n);
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
