@@ -96,7 +96,7 @@ struct RenderSettings {
 
   // What is said.
 
-  bool quiet = false;           ///< no progress on standard error; warnings and errors still are
+  bool quiet = false;           ///< errors only: neither progress nor warnings
   std::string stats_path = {};  ///< the run's report as JSON; empty: none
 };
 
