@@ -39,7 +39,7 @@ struct alignas(128) Placement {
   int32_t object = 0;           // glTF node index + 1, for the object id AOV
   int32_t first_light = kNone;  // light of triangle 0; triangle k is first_light + k; kNone: not emissive
   float object_to_world[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // 3x4, row-major
-  float normal_to_world[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};            // 3x3 cofactors, row-major
+  float normal_to_world[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};            // 3x3 cofactors x sign of the determinant, row-major
 };
 static_assert(sizeof(Placement) == 128);
 

@@ -11,15 +11,13 @@ struct EnvironmentView {
   int32_t width = 0;  // 0: no environment, nothing else may be read
   int32_t height = 0;
   const float* texels = nullptr;
-  const uint32_t* row_cdf = nullptr;
-  const uint32_t* column_cdf = nullptr;
-  const float* texel_probability = nullptr;
+  const int32_t* row_cdf = nullptr;
+  const int32_t* column_cdf = nullptr;
 };
 
 inline EnvironmentView ViewOf(const Environment& environment) {
-  return {environment.width,           environment.height,
-          environment.texels.data(),   environment.row_cdf.data(),
-          environment.column_cdf.data(), environment.texel_probability.data()};
+  return {environment.width, environment.height, environment.texels.data(),
+          environment.row_cdf.data(), environment.column_cdf.data()};
 }
 
 /// Borrows from a `SceneTables` that must outlive it and stay unchanged.

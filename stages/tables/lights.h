@@ -6,7 +6,14 @@
 
 namespace carpool::stages {
 
-enum class LightType : int32_t { triangle = 0, point = 1, spot = 2, directional = 3 };
+enum class LightType : int32_t {
+  triangle = 0,            // emits on the side of its geometric normal
+  two_sided_triangle = 1,
+  point = 2,
+  spot = 3,
+  directional = 4,
+};
+constexpr int32_t kLastTriangleType = 1;  // types up to here are triangles
 
 /// One light: 16 words. Positions and directions are world space relative to `SceneTables::origin`.
 struct alignas(64) Light {
@@ -23,33 +30,37 @@ struct alignas(64) Light {
 };
 static_assert(sizeof(Light) == 64);
 
-/// A node of the light tree; its layout belongs to render/lights (builder) and
-/// stages/kernels/light_tree-inl.h (reader). 16 words.
+/// A node of the light tree: a cluster of lights. 16 words. The root is node 0; node 1 is unused, so that
+/// siblings are a pair (2k, 2k + 1) and each finds the other by flipping the lowest bit.
 struct alignas(64) LightNode {
-  float bounds_min[3];
-  int32_t child_or_light;  // inner: index of the right child (the left one follows its parent);
-                           // leaf: ~light index
-  float bounds_max[3];
-  int32_t parent;          // -1 at the root
-  float axis[3];           // cone of emission normals (Conty Estevez & Kulla 2018)
-  float cos_theta_o;       // bound on the angle between an emitter's normal and the axis
-  float power;             // sum over the subtree, luminance-weighted
-  float cos_theta_e;       // bound on the emission angle about a normal
-  int32_t two_sided;
-  int32_t pad;
+  float center[3] = {0, 0, 0};  // sphere around everything that emits
+  float radius = 0;
+  float axis[3] = {0, 0, 1};  // cone of emission normals (Conty Estevez & Kulla 2018)
+  float power = 0;            // candela of luminance, summed, as a share of the whole tree's
+  float cos_theta_o = 1;      // bound on the angle between an emitter's normal and the axis
+  float sin_theta_o = 0;
+  float cos_theta_e = 0;      // bound on the emission angle about a normal
+  int32_t two_sided = 0;      // 1: the cone's opposite counts as well
+  int32_t child_or_light = -1;  // inner: index of the left child, the right one follows; leaf: ~light
+  int32_t parent = -1;          // -1 at the root
+  int32_t pad[2] = {};
 };
 static_assert(sizeof(LightNode) == 64);
 
+/// Selection masses of an environment table are integers whose sum is this: the grid of a 24-bit float in
+/// [0, 1), so that a table is inverted without any rounding.
+constexpr int32_t kEnvironmentMass = 1 << 24;
+
 /// Lat-long environment map. Radiance is bilinear between texel centres, wrapping in u, clamped in v;
 /// direction (x, y, z) is at u = 1/2 + atan2(x, -z) / 2 pi, v = acos(y) / pi (glTF's -Z is the middle).
-/// Selection probabilities are exact: integer masses whose total is 2^32 per table.
 struct Environment {
   int32_t width = 0;  // 0: no environment
   int32_t height = 0;
-  std::vector<float> texels;             // RGB, width * height * 3, cd/m2, finite and >= 0
-  std::vector<uint32_t> row_cdf;         // height entries: exclusive cumulative mass of rows
-  std::vector<uint32_t> column_cdf;      // width * height: exclusive cumulative mass within each row
-  std::vector<float> texel_probability;  // width * height: P(row) P(column | row) as selected
+  /// 4 floats a texel: RGB in cd/m2, finite and >= 0, then P(row) P(column | row), the probability that
+  /// sampling selects this texel: > 0 wherever RGB is. At most 2^29 texels.
+  std::vector<float> texels;
+  std::vector<int32_t> row_cdf;     // height entries: exclusive cumulative mass of rows
+  std::vector<int32_t> column_cdf;  // width * height: exclusive cumulative mass within each row
 };
 
 struct LightTables {

@@ -1,0 +1,96 @@
+// The film's exact sums: fixed point conversion, carries, atomic adds.
+#include "stages/film/accumulator.h"
+
+#include <cmath>
+#include <limits>
+
+namespace carpool::stages {
+namespace {
+
+// Relaxed order is enough: a sum's value does not depend on order, and readers come after a join.
+template <class T>
+T FetchAdd(T& cell, T value) {
+  return std::atomic_ref<T>(cell).fetch_add(value, std::memory_order_relaxed);
+}
+
+int64_t ToFixed(double value) { return std::llrint(value / kFilmQuantum); }
+
+void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
+  if (value == 0) return;
+  const uint64_t bits = static_cast<uint64_t>(value);
+  const uint64_t old = FetchAdd(low, bits);
+  const int carry = (old + bits < old ? 1 : 0) + (value < 0 ? -1 : 0);
+  if (carry != 0) FetchAdd(high, static_cast<int16_t>(carry));
+}
+
+}  // namespace
+
+FilmAccumulator::FilmAccumulator(uint32_t width, uint32_t height, const FilmPlanes& planes)
+    : width_(width), height_(height), planes_(planes) {
+  const size_t count = size_t{width} * height;
+  pixels_.resize(count);
+  if (planes.albedo) albedo_.resize(count * 3);
+  if (planes.normal) normal_.resize(count * 3);
+  if (planes.depth) depth_.assign(count, std::numeric_limits<float>::infinity());
+  if (planes.object) object_.resize(count);
+  if (planes.material) material_.resize(count);
+}
+
+uint64_t FilmAccumulator::bytes() const {
+  return pixels_.size() * sizeof(FilmPixel) + (albedo_.size() + normal_.size()) * sizeof(int64_t) +
+         (depth_.size() + object_.size() + material_.size()) * sizeof(uint32_t);
+}
+
+void FilmAccumulator::Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
+  FilmPixel& p = pixels_[pixel];
+  const int first = static_cast<int>(sample % kScrambles) * 3;
+  bool rejected = false;
+  for (int c = 0; c < 3; ++c) {
+    double value = radiance[c];
+    if (!(std::abs(value) <= kFilmLargest)) {  // also NaN
+      rejected = true;
+      value = std::isfinite(value) ? std::copysign(kFilmLargest, value) : 0;
+    }
+    AddFixed(p.low[first + c], p.high[first + c], ToFixed(value));
+  }
+  if (rejected) FetchAdd(p.rejected, 1u);
+  FetchAdd(p.samples, 1u);
+}
+
+void FilmAccumulator::AddFirstHit(uint32_t pixel, uint32_t sample, const FirstHit& hit) {
+  const size_t base = size_t{pixel} * 3;
+  for (int c = 0; c < 3; ++c) {
+    if (planes_.albedo) FetchAdd(albedo_[base + c], ToFixed(hit.albedo[c]));
+    if (planes_.normal) FetchAdd(normal_[base + c], ToFixed(hit.normal[c]));
+  }
+  if (sample != 0) return;  // one writer per pixel from here
+  if (planes_.depth) depth_[pixel] = hit.depth;
+  if (planes_.object) object_[pixel] = hit.object;
+  if (planes_.material) material_[pixel] = hit.material;
+}
+
+double FilmAccumulator::Sum(uint32_t pixel, int scramble, int channel) const {
+  const FilmPixel& p = pixels_[pixel];
+  const int i = scramble * 3 + channel;
+  const __int128 sum = (static_cast<__int128>(p.high[i]) << 64) + p.low[i];
+  return static_cast<double>(sum) * kFilmQuantum;
+}
+
+namespace {
+void MeanOf(const std::vector<int64_t>& sums, uint32_t pixel, uint32_t samples, double out[3]) {
+  for (int c = 0; c < 3; ++c) {
+    out[c] = samples == 0 ? 0
+                          : static_cast<double>(sums[size_t{pixel} * 3 + c]) * kFilmQuantum / samples;
+  }
+}
+}  // namespace
+
+void FilmAccumulator::Albedo(uint32_t pixel, double rgb[3]) const {
+  MeanOf(albedo_, pixel, Samples(pixel), rgb);
+}
+
+void FilmAccumulator::Normal(uint32_t pixel, double xyz[3]) const {
+  MeanOf(normal_, pixel, Samples(pixel), xyz);
+}
+
+}  // namespace carpool::stages

@@ -1,0 +1,85 @@
+// Camera rays: filter importance sampling, perspective and orthographic projection, the initial ray cone.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_CAMERA_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_CAMERA_INL_H_
+#undef CARPOOL_STAGES_KERNELS_CAMERA_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_CAMERA_INL_H_
+#endif
+
+#include "stages/kernels/kernels.h"
+#include "stages/kernels/path-inl.h"
+#include "stages/sampling/filter-inl.h"
+#include "stages/sampling/sobol-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// Point of the image plane, in units of the camera's half extents, right and up.
+template <class D>
+HWY_INLINE Vec2<D> ImagePlanePoint(D d, const KernelContext& c, Uint<D> pixel, const Vec2<D>& offset) {
+  const IntTag<D> di;
+  // Exact for widths up to 65,536: pixel numbers are below 2^28 and the quotient is mended by one step.
+  const Int<D> index = hn::BitCast(di, pixel);
+  const Int<D> width = hn::Set(di, static_cast<int32_t>(c.width));
+  const Real<D> guess = hn::ConvertTo(d, index) * Splat(d, 1.0 / c.width);
+  Int<D> row = hn::ConvertTo(di, guess);
+  row = hn::IfThenElse(hn::Gt(row * width, index), row - hn::Set(di, 1), row);
+  row = hn::IfThenElse(hn::Gt(index - row * width, width - hn::Set(di, 1)), row + hn::Set(di, 1), row);
+  const Int<D> column = index - row * width;
+  const Real<D> half = Splat(d, 0.5);
+  const Real<D> x = hn::ConvertTo(d, column) + half + offset.x;
+  const Real<D> y = hn::ConvertTo(d, row) + half + offset.y;
+  return {hn::MulSub(x, Splat(d, 2.0 / c.width), Splat(d, 1)),
+          hn::NegMulAdd(y, Splat(d, 2.0 / c.height), Splat(d, 1))};
+}
+
+template <class D>
+HWY_INLINE void CameraLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
+  const UintTag<D> du;
+  const Uint<D> pixel = hn::BitCast(du, PathInt(d, p, offsetof(PathState, pixel)));
+  const Uint<D> sample = hn::BitCast(du, PathInt(d, p, offsetof(PathState, sample)));
+  const SampleKey<D> key = MakeSampleKey(d, pixel, sample, c.seed);
+  const Vec2<D> u = Sample2D(d, key, hn::Zero(du), Purpose::camera_filter);
+  const Vec2<D> plane = ImagePlanePoint(d, c, pixel, SamplePixelFilter(d, u));
+
+  const float* m = c.camera.world_from_camera;
+  const auto axis = [&](int column) HWY_ATTR {
+    return Splat3(d, m[column], m[4 + column], m[8 + column]);
+  };
+  const Real<D> x = plane.x * Splat(d, c.camera.half_width);
+  const Real<D> y = plane.y * Splat(d, c.camera.half_height);
+  const double pixel_extent = 2.0 * c.camera.half_height / c.height;
+  const Vec3<D> sideways = MulAdd(axis(0), x, Scale(axis(1), y));
+
+  Vec3<D> origin = axis(3), direction;
+  Real<D> width = hn::Zero(d), spread = hn::Zero(d);
+  if (c.camera.orthographic != 0) {
+    origin = Add<D>(origin, sideways);
+    direction = Neg<D>(axis(2));
+    width = Splat(d, pixel_extent);
+  } else {
+    direction = Normalize(d, Sub<D>(sideways, axis(2)));
+    spread = Splat(d, pixel_extent);
+  }
+
+  const LaneList<D> list = ListLanes(d, p, p.active);
+  const Real<D> zero = hn::Zero(d);
+  StoreVec3(d, list, offsetof(PathState, origin), origin);
+  StoreWord(d, list, offsetof(PathState, tnear), zero);
+  StoreVec3(d, list, offsetof(PathState, direction), direction);
+  StoreWord(d, list, offsetof(PathState, pdf), zero);
+  StoreVec3(d, list, offsetof(PathState, throughput), Splat3(d, 1, 1, 1));
+  StoreWord(d, list, offsetof(PathState, cone_width), width);
+  StoreVec3(d, list, offsetof(PathState, radiance), Splat3(d, 0, 0, 0));
+  StoreWord(d, list, offsetof(PathState, cone_spread), spread);
+  StoreWord(d, list, offsetof(PathState, flags), zero);
+  StoreWord(d, list, offsetof(PathState, shadow_distance), zero);
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

@@ -1,0 +1,236 @@
+// The environment map: radiance along a direction, and directions drawn in proportion to it.
+//
+// The density of `SampleEnvironment` over the map is exactly the bilinear interpolation of the texels'
+// selection probabilities: a texel is chosen by inverting integer tables, then a place under its tent,
+// the triangle function that bilinear interpolation gives it. Lookup and density read the same four
+// texels with the same weights, so a direction with radiance has a density.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_ENVIRONMENT_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_ENVIRONMENT_INL_H_
+#undef CARPOOL_STAGES_KERNELS_ENVIRONMENT_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_ENVIRONMENT_INL_H_
+#endif
+
+#include "stages/kernels/light_math-inl.h"
+#include "stages/tables/light_view.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// A place on the map in texels: texel centres are at integers, `s` is in [-1/2, width - 1/2] and `t` in
+/// [-1/2, height - 1/2]; `sin_theta` belongs to the direction and is kept because it is exact there.
+template <class D>
+struct EnvironmentPlace {
+  Real<D> s, t, sin_theta;
+};
+
+template <class D>
+struct EnvironmentValue {
+  Vec3<D> radiance;
+  Real<D> pdf;  // per solid angle; 0 where the map selects nothing
+};
+
+template <class D>
+struct EnvironmentSample {
+  Vec3<D> dir, radiance;
+  Real<D> pdf;  // 0: no sample
+};
+
+/// Four texels (offsets into `EnvironmentView::texels`) and their bilinear weights.
+template <class D>
+struct EnvironmentTaps {
+  Int<D> at00, at10, at01, at11;
+  Real<D> w00, w10, w01, w11;
+};
+
+template <class D>
+HWY_INLINE EnvironmentPlace<D> PlaceOfDirection(D d, const EnvironmentView& view,
+                                                const Vec3<D>& dir) {
+  const Real<D> half = Splat(d, 0.5);
+  const Real<D> sin_theta = SafeSqrt(d, hn::MulAdd(dir.x, dir.x, dir.z * dir.z));
+  const Real<D> u = hn::MulAdd(Atan2(d, dir.x, hn::Neg(dir.z)), Splat(d, 0.5 / kPi), half);
+  const Real<D> v = Atan2(d, sin_theta, dir.y) * Splat(d, 1 / kPi);
+  return {hn::MulSub(u, Splat(d, view.width), half), hn::MulSub(v, Splat(d, view.height), half),
+          sin_theta};
+}
+
+/// floor(x) as an integer, and what is left of x.
+template <class D>
+HWY_INLINE Int<D> SplitFloor(D d, Real<D> x, Real<D>& fraction) {
+  const Real<D> floor = hn::Floor(x);
+  fraction = x - floor;
+  return hn::ConvertTo(IntTag<D>(), floor);
+}
+template <class D>
+HWY_INLINE Int<D> ClampIndex(D, Int<D> index, int32_t count) {
+  const IntTag<D> di;
+  return hn::Min(hn::Max(index, hn::Zero(di)), hn::Set(di, count - 1));
+}
+
+template <class D>
+HWY_INLINE EnvironmentTaps<D> TapsAt(D d, const EnvironmentView& view,
+                                     const EnvironmentPlace<D>& place) {
+  const IntTag<D> di;
+  const Int<D> one = hn::Set(di, 1), width = hn::Set(di, view.width);
+  Real<D> fs, ft;
+  Int<D> i = SplitFloor(d, place.s, fs), j = SplitFloor(d, place.t, ft);
+
+  i = hn::IfThenElse(hn::Lt(i, hn::Zero(di)), i + width, i);
+  i = ClampIndex(d, i, view.width);  // wrapped already; the clamp is for NaN directions
+  const Int<D> next = i + one;
+  const Int<D> i1 = hn::IfThenElseZero(hn::Lt(next, width), next);
+  const Int<D> row0 = ClampIndex(d, j, view.height) * width;
+  const Int<D> row1 = ClampIndex(d, j + one, view.height) * width;
+
+  const Real<D> gs = Splat(d, 1) - fs, gt = Splat(d, 1) - ft;
+  return {hn::ShiftLeft<2>(row0 + i),  hn::ShiftLeft<2>(row0 + i1), hn::ShiftLeft<2>(row1 + i),
+          hn::ShiftLeft<2>(row1 + i1), gs * gt, fs * gt, gs * ft, fs * ft};
+}
+
+/// The bilinear value of channel 0..3 of the texels.
+template <class D>
+HWY_INLINE Real<D> Interpolate(D d, const EnvironmentView& view, const EnvironmentTaps<D>& taps,
+                               int32_t channel) {
+  const float* HWY_RESTRICT base = view.texels + channel;
+  return hn::MulAdd(taps.w00, GatherReal(d, base, taps.at00),
+                    hn::MulAdd(taps.w10, GatherReal(d, base, taps.at10),
+                               hn::MulAdd(taps.w01, GatherReal(d, base, taps.at01),
+                                          taps.w11 * GatherReal(d, base, taps.at11))));
+}
+template <class D>
+HWY_INLINE Vec3<D> InterpolateRadiance(D d, const EnvironmentView& view,
+                                       const EnvironmentTaps<D>& taps) {
+  return {Interpolate(d, view, taps, 0), Interpolate(d, view, taps, 1),
+          Interpolate(d, view, taps, 2)};
+}
+/// d(u, v) covers 2 pi^2 sin(theta) of solid angle. The floor only spares the very poles a 1/0.
+template <class D>
+HWY_INLINE Real<D> InterpolatePdf(D d, const EnvironmentView& view, const EnvironmentTaps<D>& taps,
+                                  Real<D> sin_theta) {
+  const double texels = static_cast<double>(view.width) * view.height;
+  return Interpolate(d, view, taps, 3) * Splat(d, texels / (2 * kPi * kPi)) /
+         hn::Max(sin_theta, Splat(d, 1e-7));
+}
+
+/// Radiance that arrives from `dir`, which has unit length.
+template <class D>
+HWY_INLINE Vec3<D> EnvironmentRadiance(D d, const EnvironmentView& view, const Vec3<D>& dir) {
+  if (view.width == 0) return Splat3(d, 0, 0, 0);
+  return InterpolateRadiance(d, view, TapsAt(d, view, PlaceOfDirection(d, view, dir)));
+}
+
+/// Density per solid angle with which `SampleEnvironment` returns `dir`.
+template <class D>
+HWY_INLINE Real<D> EnvironmentPdf(D d, const EnvironmentView& view, const Vec3<D>& dir) {
+  if (view.width == 0) return hn::Zero(d);
+  const EnvironmentPlace<D> place = PlaceOfDirection(d, view, dir);
+  return InterpolatePdf(d, view, TapsAt(d, view, place), place.sin_theta);
+}
+
+/// Both of the above for the price of one look-up.
+template <class D>
+HWY_INLINE EnvironmentValue<D> LookUpEnvironment(D d, const EnvironmentView& view,
+                                                 const Vec3<D>& dir) {
+  if (view.width == 0) return {Splat3(d, 0, 0, 0), hn::Zero(d)};
+  const EnvironmentPlace<D> place = PlaceOfDirection(d, view, dir);
+  const EnvironmentTaps<D> taps = TapsAt(d, view, place);
+  return {InterpolateRadiance(d, view, taps), InterpolatePdf(d, view, taps, place.sin_theta)};
+}
+
+/// An entry of an exclusive cumulative table, and where within the entry's mass the number fell: in (0, 1).
+template <class D>
+struct TableEntry {
+  Int<D> index;
+  Real<D> within;
+};
+
+/// The last of `count` entries, from table[start], whose cumulative mass is not above u's cell: entries
+/// without mass share their successor's (or the end's) and are never the last.
+template <class D>
+HWY_INLINE TableEntry<D> InvertTable(D d, const int32_t* HWY_RESTRICT table, Int<D> start,
+                                     int32_t count, Real<D> u) {
+  const IntTag<D> di;
+  const Int<D> total = hn::Set(di, kEnvironmentMass), end = hn::Set(di, count);
+  const Real<D> clamped = hn::Min(hn::Max(u, hn::Zero(d)), Splat(d, kLargestBelowOne));
+  const Int<D> cell = hn::ConvertTo(di, clamped * Splat(d, kEnvironmentMass));
+  const auto cumulative = [&](Int<D> i) HWY_ATTR {
+    const auto inside = hn::Lt(i, end);
+    return hn::IfThenElse(inside, GatherInt(d, table, start + hn::IfThenElseZero(inside, i)), total);
+  };
+
+  int32_t step = 1;
+  while (step < count) step *= 2;
+  Int<D> index = hn::Zero(di);
+  for (step /= 2; step > 0; step /= 2) {
+    const Int<D> candidate = index + hn::Set(di, step);
+    index = hn::IfThenElse(hn::Gt(cumulative(candidate), cell), index, candidate);
+  }
+  const Int<D> low = cumulative(index);
+  const Int<D> mass = cumulative(index + hn::Set(di, 1)) - low;
+  // The middle of u's cell, so that an entry of a single cell is met at its centre.
+  const Real<D> offset = hn::ConvertTo(d, cell - low) + Splat(d, 0.5);
+  return {index, SafeDiv(d, offset, hn::ConvertTo(d, mass))};
+}
+
+/// Inverts the triangle distribution on (-1, 1), monotonically.
+template <class D>
+HWY_INLINE Real<D> SampleTent(D d, Real<D> u) {
+  const Real<D> one = Splat(d, 1), two = Splat(d, 2);
+  const Mask<D> rising = hn::Lt(u, Splat(d, 0.5));
+  const Real<D> root = SafeSqrt(d, two * hn::IfThenElse(rising, u, one - u));
+  return hn::IfThenElse(rising, root - one, one - root);
+}
+
+/// A place with the density described above: tents are wrapped in s and reflected at the poles, which is
+/// what wrapping and clamping make of bilinear interpolation.
+template <class D>
+HWY_INLINE EnvironmentPlace<D> SamplePlace(D d, const EnvironmentView& view, const Vec2<D>& u) {
+  const IntTag<D> di;
+  const TableEntry<D> row =
+      InvertTable(d, view.row_cdf, hn::Zero(di), view.height, u.y);
+  const TableEntry<D> column =
+      InvertTable(d, view.column_cdf, row.index * hn::Set(di, view.width), view.width, u.x);
+  Real<D> s = hn::ConvertTo(d, column.index) + SampleTent(d, column.within);
+  Real<D> t = hn::ConvertTo(d, row.index) + SampleTent(d, row.within);
+
+  const Real<D> first = Splat(d, -0.5), width = Splat(d, view.width);
+  const Real<D> last = Splat(d, view.height - 0.5);
+  s = hn::IfThenElse(hn::Lt(s, first), s + width, s);
+  s = hn::IfThenElse(hn::Lt(s, width + first), s, s - width);
+  t = hn::IfThenElse(hn::Lt(t, first), Splat(d, -1) - t, t);
+  t = hn::IfThenElse(hn::Gt(t, last), last + last - t, t);
+  t = hn::Min(hn::Max(t, first), last);
+  // From the nearer pole, so that the sine keeps its relative precision there.
+  const Real<D> from_pole = hn::Min(t - first, last - t) * Splat(d, kPi / view.height);
+  return {s, t, hn::Sin(d, from_pole)};
+}
+
+template <class D>
+HWY_INLINE Vec3<D> DirectionOfPlace(D d, const EnvironmentView& view,
+                                    const EnvironmentPlace<D>& place) {
+  const Real<D> middle = Splat(d, 0.5 * view.width - 0.5);
+  const Real<D> phi = (place.s - middle) * Splat(d, 2 * kPi / view.width);
+  const Real<D> equator = Splat(d, 0.5 * view.height - 0.5);
+  const Real<D> elevation = (equator - place.t) * Splat(d, kPi / view.height);
+  return {place.sin_theta * hn::Sin(d, phi), hn::Sin(d, elevation),
+          hn::Neg(place.sin_theta * hn::Cos(d, phi))};
+}
+
+/// A direction drawn in proportion to the map's luminance x sin(theta), bilinear like the map.
+template <class D>
+HWY_INLINE EnvironmentSample<D> SampleEnvironment(D d, const EnvironmentView& view,
+                                                  const Vec2<D>& u) {
+  if (view.width == 0) return {Splat3(d, 0, 1, 0), Splat3(d, 0, 0, 0), hn::Zero(d)};
+  const EnvironmentPlace<D> place = SamplePlace(d, view, u);
+  const EnvironmentTaps<D> taps = TapsAt(d, view, place);
+  return {DirectionOfPlace(d, view, place), InterpolateRadiance(d, view, taps),
+          InterpolatePdf(d, view, taps, place.sin_theta)};
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

@@ -1,0 +1,68 @@
+// The stages' kernels as plain functions over slots of path state: one table per instruction set, each
+// function at full SIMD width and at one lane, from the same source.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "stages/film/accumulator.h"
+#include "stages/tables/bsdf_tables.h"
+#include "stages/tables/camera.h"
+#include "stages/tables/geometry_view.h"
+#include "stages/tables/light_view.h"
+#include "stages/tables/materials.h"
+#include "stages/tables/path.h"
+#include "stages/tables/texture_view.h"
+#include "stages/tracing/trace.h"
+
+namespace carpool::stages {
+
+/// All that kernels read of a render; borrowed, constant while it runs.
+struct KernelContext {
+  Camera camera;
+  GeometryView geometry;
+  const Material* materials = nullptr;
+  TextureTablesView textures;
+  LightView lights;
+  BsdfTablesView bsdf;
+  TraceView trace;
+  FilmAccumulator* film = nullptr;
+  bool first_hits = false;  // the film keeps AOVs of the first hit
+  uint32_t width = 1, height = 1;
+  uint32_t seed = 0;
+  uint32_t max_depth = 8;       // scattering events
+  uint32_t roulette_depth = 3;  // events before Russian roulette
+};
+
+/// Where a path goes next.
+enum class Next : uint8_t { film, shadow, trace };
+
+/// One width of the kernels. Each handles `slots` of `paths`; masked lanes touch nothing.
+struct KernelSet {
+  int lanes = 1;
+  /// Starts paths: pixel and sample are set in each slot, the rest is written.
+  void (*camera)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots);
+  /// Shades surface hits: emission, next-event estimation, BSDF sampling, roulette; or passes through a
+  /// transparent layer. Writes the way of each slot to `next`.
+  void (*shade)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots, Next* next);
+  /// Adds the environment to paths that left the scene; they end.
+  void (*miss)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots);
+};
+
+/// An instruction set of this binary.
+struct Kernels {
+  std::string_view isa;  // "sse4", "avx2", "avx512"
+  KernelSet wide;
+  KernelSet one;
+  /// Coverage of a possibly transparent material, for shadow rays. `context` is a KernelContext.
+  float (*opacity)(const void* context, int32_t placement, uint32_t primitive, float u, float v);
+};
+
+/// The instruction sets that this binary has and this machine can run, best first; never empty on x86-64 with SSE4.2.
+std::span<const Kernels> AvailableKernels();
+
+/// `isa` among AvailableKernels(), or the best for "auto"; null if it is not available.
+const Kernels* FindKernels(std::string_view isa);
+
+}  // namespace carpool::stages

@@ -1,0 +1,137 @@
+// How kernels read and write path state: gathers by slot, and stores to the lanes that a mask names.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_PATH_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_PATH_INL_H_
+#undef CARPOOL_STAGES_KERNELS_PATH_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_PATH_INL_H_
+#endif
+
+#include <cstring>
+
+#include "stages/simd/lanes-inl.h"
+#include "stages/tables/path.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// Up to one vector of slots; idle lanes repeat the last slot, so that reading them is harmless.
+template <class D>
+struct PathLanes {
+  PathState* paths;
+  Int<D> slot;
+  Mask<D> active;
+};
+
+template <class D>
+HWY_INLINE PathLanes<D> LoadSlots(D d, PathState* paths, const uint32_t* slots, size_t count) {
+  const IntTag<D> di;
+  constexpr size_t kLanes = hn::MaxLanes(D());
+  if constexpr (kLanes == 1) {
+    return {paths, hn::Set(di, static_cast<int32_t>(slots[0])), hn::FirstN(d, 1)};
+  } else {
+    if (count >= hn::Lanes(d)) {
+      return {paths, hn::BitCast(di, hn::LoadU(UintTag<D>(), slots)), hn::FirstN(d, hn::Lanes(d))};
+    }
+    HWY_ALIGN uint32_t padded[kLanes];
+    for (size_t i = 0; i < kLanes; ++i) padded[i] = slots[i < count ? i : count - 1];
+    return {paths, hn::BitCast(di, hn::Load(UintTag<D>(), padded)), hn::FirstN(d, count)};
+  }
+}
+
+template <class D>
+HWY_INLINE Real<D> PathReal(D d, const PathLanes<D>& p, size_t offset) {
+  return FieldReal<PathState>(d, p.paths, p.slot, offset);
+}
+template <class D>
+HWY_INLINE Int<D> PathInt(D d, const PathLanes<D>& p, size_t offset) {
+  return FieldInt<PathState>(d, p.paths, p.slot, offset);
+}
+template <class D>
+HWY_INLINE Vec3<D> PathVec3(D d, const PathLanes<D>& p, size_t offset) {
+  return FieldVec3<PathState>(d, p.paths, p.slot, offset);
+}
+
+/// The lanes of a mask, as a list to loop over.
+template <class D>
+struct LaneList {
+  static constexpr size_t kLanes = hn::MaxLanes(D());
+  size_t count = 0;
+  uint8_t lane[kLanes];
+  PathState* path[kLanes];
+};
+
+template <class D>
+HWY_INLINE LaneList<D> ListLanes(D d, const PathLanes<D>& p, Mask<D> mask) {
+  LaneList<D> list;
+  HWY_ALIGN int32_t slots[LaneList<D>::kLanes];
+  hn::Store(p.slot, IntTag<D>(), slots);
+  uint8_t bytes[(LaneList<D>::kLanes + 7) / 8 + 8] = {};
+  hn::StoreMaskBits(d, mask, bytes);
+  uint64_t bits = 0;
+  std::memcpy(&bits, bytes, 8);
+  while (bits != 0) {
+    const int lane = __builtin_ctzll(bits);
+    bits &= bits - 1;
+    list.lane[list.count] = static_cast<uint8_t>(lane);
+    list.path[list.count++] = p.paths + slots[lane];
+  }
+  return list;
+}
+
+/// Writes word `offset / 4` of each listed path.
+template <class D, class V>
+HWY_INLINE void StoreWord(D d, const LaneList<D>& list, size_t offset, V value) {
+  HWY_ALIGN float lanes[LaneList<D>::kLanes];
+  hn::Store(hn::BitCast(d, value), d, lanes);
+  for (size_t i = 0; i < list.count; ++i) {
+    std::memcpy(reinterpret_cast<char*>(list.path[i]) + offset, &lanes[list.lane[i]], 4);
+  }
+}
+template <class D>
+HWY_INLINE void StoreVec3(D d, const LaneList<D>& list, size_t offset, const Vec3<D>& value) {
+  StoreWord(d, list, offset, value.x);
+  StoreWord(d, list, offset + 4, value.y);
+  StoreWord(d, list, offset + 8, value.z);
+}
+
+/// Unit vector to 2 x 16 bit octahedral coordinates (Cigolle et al. 2014) and back. Selection of lights
+/// and its MIS counterpart both use the decoded one, so its rounding never biases.
+template <class D>
+HWY_INLINE Uint<D> EncodeNormal(D d, const Vec3<D>& n) {
+  const IntTag<D> di;
+  const Real<D> one = Splat(d, 1);
+  const Real<D> inverse = one / (hn::Abs(n.x) + hn::Abs(n.y) + hn::Abs(n.z));
+  const Real<D> px = n.x * inverse, py = n.y * inverse;
+  const Mask<D> lower = hn::Lt(n.z, hn::Zero(d));
+  const Real<D> x = hn::IfThenElse(lower, hn::CopySign(one - hn::Abs(py), px), px);
+  const Real<D> y = hn::IfThenElse(lower, hn::CopySign(one - hn::Abs(px), py), py);
+  const auto quantise = [&](Real<D> v) HWY_ATTR {
+    const Real<D> scaled = hn::MulAdd(v, Splat(d, 32767), Splat(d, 32768));
+    return hn::BitCast(UintTag<D>(), hn::NearestInt(hn::Min(hn::Max(scaled, hn::Zero(d)), Splat(d, 65535))));
+  };
+  (void)di;
+  return hn::Or(quantise(x), hn::ShiftLeft<16>(quantise(y)));
+}
+template <class D>
+HWY_INLINE Vec3<D> DecodeNormal(D d, Uint<D> bits) {
+  const IntTag<D> di;
+  const UintTag<D> du;
+  const auto expand = [&](Uint<D> v) HWY_ATTR {
+    const Real<D> r = hn::ConvertTo(d, hn::BitCast(di, v));
+    return (r - Splat(d, 32768)) * Splat(d, 1.0 / 32767);
+  };
+  const Real<D> x = expand(hn::And(bits, hn::Set(du, 0xffffu)));
+  const Real<D> y = expand(hn::ShiftRight<16>(bits));
+  const Real<D> z = Splat(d, 1) - hn::Abs(x) - hn::Abs(y);
+  const Real<D> fold = hn::Max(hn::Neg(z), hn::Zero(d));
+  const Vec3<D> n = {x - hn::CopySign(fold, x), y - hn::CopySign(fold, y), z};
+  return Normalize(d, n);
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

@@ -1,0 +1,401 @@
+// Shading: one vertex of each path: transparency, emission, next-event estimation, BSDF sampling, roulette.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_SHADE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_SHADE_INL_H_
+#undef CARPOOL_STAGES_KERNELS_SHADE_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_SHADE_INL_H_
+#endif
+
+#include "stages/kernels/bsdf-inl.h"
+#include "stages/kernels/kernels.h"
+#include "stages/kernels/light_sample-inl.h"
+#include "stages/kernels/path-inl.h"
+#include "stages/kernels/surface-inl.h"
+#include "stages/sampling/sobol-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// Weight of a sample with density `own` that could also have come from density `other`: power
+/// heuristic, as a ratio so that squares neither overflow nor vanish.
+template <class D>
+HWY_INLINE Real<D> PowerHeuristic(D d, Real<D> own, Real<D> other) {
+  const Real<D> ratio = hn::Min(SafeDiv(d, other, own), Splat(d, 1e18));
+  return Splat(d, 1) / hn::MulAdd(ratio, ratio, Splat(d, 1));
+}
+
+/// One vertex of the paths in flight, as the steps below hand it on.
+template <class D>
+struct Vertex {
+  PathLanes<D> path;
+  Int<D> primitive;
+  Uint<D> depth;            // scattering events before this one
+  Uint<D> flags;
+  SampleKey<D> key;
+  SurfacePoint<D> at;
+  Surface<D> surface;
+  TextureFootprint<D> footprint;
+  Real<D> cone_width;       // of the ray cone, here
+  Vec3<D> toward;           // to the previous vertex
+  Vec3<D> ray_origin;
+  Real<D> ray_pdf;
+  Real<D> distance;
+  Vec3<D> throughput;
+  Vec3<D> radiance;         // of the path so far, updated by the steps
+};
+
+template <class D>
+HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>& p) {
+  const UintTag<D> du;
+  Vertex<D> v;
+  v.path = p;
+  v.flags = hn::BitCast(du, PathInt(d, p, offsetof(PathState, flags)));
+  v.depth = hn::And(v.flags, hn::Set(du, kPathDepthMask));
+  v.key = MakeSampleKey(d, hn::BitCast(du, PathInt(d, p, offsetof(PathState, pixel))),
+                        hn::BitCast(du, PathInt(d, p, offsetof(PathState, sample))), c.seed);
+  v.ray_origin = PathVec3(d, p, offsetof(PathState, origin));
+  v.ray_pdf = PathReal(d, p, offsetof(PathState, pdf));
+  v.distance = PathReal(d, p, offsetof(PathState, distance));
+  v.throughput = PathVec3(d, p, offsetof(PathState, throughput));
+  v.radiance = PathVec3(d, p, offsetof(PathState, radiance));
+  const Vec3<D> direction = PathVec3(d, p, offsetof(PathState, direction));
+  v.toward = Neg<D>(direction);
+
+  v.primitive = PathInt(d, p, offsetof(PathState, primitive));
+  v.at = MakeSurfacePoint(d, c, PathInt(d, p, offsetof(PathState, placement)), v.primitive,
+                          PathReal(d, p, offsetof(PathState, u)), PathReal(d, p, offsetof(PathState, v)));
+  v.surface = MakeSurface(d, c, v.at, v.primitive, direction);
+
+  v.cone_width = hn::MulAdd(PathReal(d, p, offsetof(PathState, cone_spread)), v.distance,
+                            PathReal(d, p, offsetof(PathState, cone_width)));
+  v.footprint.uv = TextureCoordinates(d, c, v.at, hn::Zero(IntTag<D>()));
+  // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter takes
+  // care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and blur).
+  const Real<D> density = SafeDiv(d, TwiceTextureArea(d, c, v.at), v.surface.twice_area);
+  v.footprint.log2_width = RoughLog2(d, v.cone_width) + RoughLog2(d, density) * Splat(d, 0.5);
+  v.footprint.u_level = HashUniform(d, v.key, v.depth, Purpose::texture_level, hn::Zero(du));
+  return v;
+}
+
+/// Lanes that go straight on: transparent by chance of their alpha, or seen from behind by the camera
+/// where the material is single-sided. (Later rays see both sides: a wall must not leak light.)
+template <class D>
+HWY_INLINE Mask<D> PassesThrough(D d, const KernelContext& c, const Vertex<D>& v, Real<D> alpha,
+                                 Mask<D> active) {
+  const UintTag<D> du;
+  const Uint<D> layers = hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
+  const Real<D> u = HashUniform(d, v.key, v.depth, Purpose::alpha, layers);
+  const Mask<D> transparent = hn::Ge(u, Opacity(d, c, v.at, alpha));
+  const Mask<D> camera_ray = hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(du)));
+  const Mask<D> double_sided = MaterialHas(d, c, v.at.material, kMaterialDoubleSided);
+  const Mask<D> culled = hn::And(hn::AndNot(double_sided, v.surface.back), camera_ray);
+  return hn::And(active, hn::Or(transparent, culled));
+}
+
+/// The same ray goes on from just behind the layer. Past the largest number of layers the path ends.
+template <class D>
+HWY_INLINE void ContinueThrough(D d, const Vertex<D>& v, Mask<D> passes, Next* next) {
+  const UintTag<D> du;
+  const Real<D> tnear = hn::MulAdd(v.distance, Splat(d, 0x1p-20), v.distance);
+  const Uint<D> flags = v.flags + hn::Set(du, 1u << kPathLayerShift);
+  const LaneList<D> list = ListLanes(d, v.path, passes);
+  StoreWord(d, list, offsetof(PathState, tnear), tnear);
+  StoreWord(d, list, offsetof(PathState, flags), flags);
+  for (size_t i = 0; i < list.count; ++i) {
+    const uint32_t layers = (list.path[i]->flags & kPathLayerMask) >> kPathLayerShift;
+    next[list.lane[i]] = layers < kMaxAlphaLayers ? Next::trace : Next::film;
+  }
+}
+
+/// What the AOVs want of the first hit.
+template <class D>
+HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v, const Vec3<D>& albedo,
+                               const Vec3<D>& normal, Mask<D> active) {
+  const Mask<D> first = hn::And(active, hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(UintTag<D>()))));
+  if (hn::AllFalse(d, first)) return;
+  const LaneList<D> list = ListLanes(d, v.path, first);
+  constexpr size_t kLanes = LaneList<D>::kLanes;
+  HWY_ALIGN float words[7][kLanes];
+  const Real<D> values[7] = {albedo.x, albedo.y, albedo.z, normal.x, normal.y, normal.z, v.distance};
+  for (int i = 0; i < 7; ++i) hn::Store(values[i], d, words[i]);
+  for (size_t i = 0; i < list.count; ++i) {
+    const size_t lane = list.lane[i];
+    const PathState& path = *list.path[i];
+    const Placement& placement = c.geometry.placements[path.placement];
+    FirstHit hit;
+    for (int k = 0; k < 3; ++k) hit.albedo[k] = words[k][lane];
+    for (int k = 0; k < 3; ++k) hit.normal[k] = words[3 + k][lane];
+    hit.depth = words[6][lane];
+    hit.object = static_cast<uint32_t>(placement.object);
+    hit.material = static_cast<uint32_t>(placement.material) + 1;
+    c.film->AddFirstHit(path.pixel, path.sample, hit);
+  }
+}
+
+/// Emission of the surface that was hit, weighted against light sampling from the previous vertex.
+template <class D>
+HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> active) {
+  const Mask<D> front = hn::Or(hn::Not(v.surface.back), MaterialHas(d, c, v.at.material, kMaterialDoubleSided));
+  active = hn::And(hn::And(active, front), MaterialHas(d, c, v.at.material, kMaterialEmissive));
+  if (hn::AllFalse(d, active)) return;
+
+  const Vec3<D> emitted = EmittedRadiance(d, c, v.at, v.footprint.uv, active);
+  Real<D> weight = Splat(d, 1);
+  const IntTag<D> di;
+  const Int<D> first_light = FieldInt(d, c.geometry.placements, v.at.placement, offsetof(Placement, first_light));
+  const Mask<D> sampled =
+      hn::And(hn::And(active, IsPresent(d, first_light)), hn::Gt(v.ray_pdf, hn::Zero(d)));
+  if (!hn::AllFalse(d, sampled)) {
+    const Int<D> light = hn::IfThenElseZero(hn::RebindMask(di, sampled), first_light + v.primitive);
+    const Vec3<D> normal =
+        DecodeNormal(d, hn::BitCast(UintTag<D>(), PathInt(d, v.path, offsetof(PathState, normal))));
+    const Triangle<D> t = TriangleVertices(d, c.geometry, v.at.placement, v.primitive);
+    const Real<D> pdf = LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
+                                               t.p1, t.p2, Neg<D>(v.toward), v.distance);
+    weight = hn::IfThenElse(sampled, PowerHeuristic(d, v.ray_pdf, pdf), weight);
+  }
+  const Vec3<D> added = Scale(Mul<D>(v.throughput, emitted), weight);
+  v.radiance = Select<D>(active, Add<D>(v.radiance, added), v.radiance);
+}
+
+template <class D>
+HWY_INLINE SurfaceParams<D> MaterialParams(D d, const KernelContext& c, const Vertex<D>& v,
+                                           const Vec3<D>& base_color, Mask<D> active) {
+  const auto factor = [&](size_t offset) HWY_ATTR { return FieldReal(d, c.materials, v.at.material, offset); };
+  const Rgba<D> mr = MaterialTexture(d, c, v.at, v.footprint, Slot::metallic_roughness, active, 1);
+  const Rgba<D> specular = MaterialTexture(d, c, v.at, v.footprint, Slot::specular, active, 1);
+  const Rgba<D> tint = MaterialTexture(d, c, v.at, v.footprint, Slot::specular_color, active, 1);
+  SurfaceParams<D> params;
+  params.base_color = base_color;
+  params.metallic = factor(offsetof(Material, metallic)) * mr.rgb.z;
+  params.roughness = factor(offsetof(Material, roughness)) * mr.rgb.y;
+  params.ior = factor(offsetof(Material, ior));
+  params.ior_zero = MaterialHas(d, c, v.at.material, kMaterialIorZero);
+  params.specular = factor(offsetof(Material, specular)) * specular.a;
+  params.specular_color = Mul<D>(
+      FieldVec3(d, c.materials, v.at.material, offsetof(Material, specular_color)), tint.rgb);
+  return params;
+}
+
+/// Radiance that a sampled triangle light sends towards `wi`'s origin; other lights know theirs already.
+template <class D>
+HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const LightSample<D>& light,
+                                   Mask<D> active) {
+  const IntTag<D> di;
+  const Int<D> type = FieldInt(d, c.lights.lights, light.light, offsetof(Light, type));
+  const Mask<D> is_light = hn::RebindMask(d, hn::Ge(light.light, hn::Zero(di)));
+  const Mask<D> triangle = hn::And(
+      hn::And(active, is_light),
+      hn::RebindMask(d, hn::Eq(type, hn::Set(di, static_cast<int32_t>(LightType::triangle)))));
+  if (hn::AllFalse(d, triangle)) return light.radiance;
+
+  const auto field = [&](size_t offset) HWY_ATTR {
+    return hn::IfThenElseZero(hn::RebindMask(di, triangle), FieldInt(d, c.lights.lights, light.light, offset));
+  };
+  const SurfacePoint<D> at = MakeSurfacePoint(d, c, field(offsetof(Light, placement)),
+                                              field(offsetof(Light, primitive)), light.b1, light.b2);
+  const Vec2<D> uv = TextureCoordinates(d, c, at, hn::Zero(di));
+  const Vec3<D> emitted = EmittedRadiance(d, c, at, uv, triangle);
+  return Select<D>(triangle, Mul<D>(light.radiance, emitted), light.radiance);
+}
+
+/// The next vertex's start and the shading frame here, shared by light and BSDF sampling.
+template <class D>
+struct Scatter {
+  Vec3<D> origin;
+  Uint<D> packed_normal;
+  Frame<D> frame;
+  Vec3<D> wo;    // local
+  Bsdf<D> bsdf;
+};
+
+template <class D>
+struct ShadowRay {
+  Vec3<D> direction, radiance;
+  Real<D> distance;
+  Mask<D> wanted;
+};
+
+/// One light, one shadow ray.
+template <class D>
+HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& v, const Scatter<D>& s,
+                                  Mask<D> active) {
+  const Real<D> u_pick = Sample1D(d, v.key, v.depth, Purpose::light_pick);
+  const Vec2<D> u_point = Sample2D(d, v.key, v.depth, Purpose::light_point);
+  const Vec3<D> normal = DecodeNormal(d, s.packed_normal);
+  const LightSample<D> light = SampleLight(d, c.lights, active, s.origin, normal, u_pick, u_point);
+  const Real<D> zero = hn::Zero(d);
+  Mask<D> wanted = hn::And(hn::And(active, hn::Gt(light.pdf, zero)),
+                           hn::Gt(Dot(light.wi, v.surface.geometric), zero));
+  ShadowRay<D> shadow = {light.wi, Splat3(d, 0, 0, 0), light.distance, wanted};
+  if (hn::AllFalse(d, wanted)) return shadow;
+
+  const BsdfValue<D> f = EvaluateBsdf(d, s.bsdf, s.wo, ToLocal(s.frame, light.wi));
+  const Real<D> mis = hn::IfThenElse(light.delta, Splat(d, 1), PowerHeuristic(d, light.pdf, f.pdf));
+  const Real<D> scale = SafeDiv(d, mis, light.pdf);
+  const Vec3<D> incoming = SampledRadiance(d, c, light, wanted);
+  shadow.radiance = Scale(Mul<D>(Mul<D>(v.throughput, f.f_cos), incoming), scale);
+  shadow.wanted = hn::And(wanted, hn::Gt(MaxComponent(shadow.radiance), zero));
+  // Stops short of the light by what both ends may be off, so that the light never shadows itself.
+  const Vec3<D> end = MulAdd(light.wi, light.distance, s.origin);
+  const auto most = [](const Vec3<D>& a) HWY_ATTR {
+    return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
+  };
+  const Real<D> margin = (light.distance + most(s.origin) + most(end)) * Splat(d, 0x1p-19);
+  const Mask<D> near_light = hn::Lt(light.distance, Splat(d, 1e29));
+  shadow.distance = hn::IfThenElse(near_light, light.distance - margin, light.distance);
+  shadow.wanted = hn::And(shadow.wanted, hn::Gt(shadow.distance, zero));
+  return shadow;
+}
+
+template <class D>
+struct Bounce {
+  Vec3<D> direction, throughput;
+  Real<D> pdf;
+  Mask<D> alive;
+};
+
+/// BSDF sample and Russian roulette.
+template <class D>
+HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& v, const Scatter<D>& s,
+                                  Mask<D> active) {
+  const UintTag<D> du;
+  const Real<D> u_lobe = Sample1D(d, v.key, v.depth, Purpose::lobe);
+  const Vec2<D> u = Sample2D(d, v.key, v.depth, Purpose::bsdf);
+  const BsdfSample<D> sample = SampleBsdf(d, s.bsdf, s.wo, u_lobe, u);
+  Bounce<D> b;
+  b.direction = ToWorld(s.frame, sample.wi);
+  b.throughput = Mul<D>(v.throughput, sample.weight);
+  b.pdf = sample.pdf;
+  b.alive = hn::And(hn::And(active, sample.valid),
+                    hn::And(hn::Gt(Dot(b.direction, v.surface.geometric), hn::Zero(d)),
+                            hn::Gt(MaxComponent(b.throughput), hn::Zero(d))));
+
+  const Mask<D> roulette = hn::And(b.alive, hn::RebindMask(d, hn::Ge(v.depth, hn::Set(du, c.roulette_depth))));
+  if (!hn::AllFalse(d, roulette)) {
+    const Real<D> survival = hn::Min(MaxComponent(b.throughput), Splat(d, 1));
+    const Real<D> u_roulette = Sample1D(d, v.key, v.depth, Purpose::roulette);
+    const Mask<D> dies = hn::And(roulette, hn::Ge(u_roulette, survival));
+    b.alive = hn::AndNot(dies, b.alive);
+    b.throughput = Select<D>(roulette, Scale(b.throughput, SafeDiv(d, Splat(d, 1), survival)), b.throughput);
+  }
+  return b;
+}
+
+template <class D>
+HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s, const ShadowRay<D>& shadow,
+                            const Bounce<D>& bounce, Mask<D> lanes, Next* next) {
+  const UintTag<D> du;
+  const Real<D> zero = hn::Zero(d);
+  const LaneList<D> list = ListLanes(d, v.path, lanes);
+  StoreVec3(d, list, offsetof(PathState, radiance), v.radiance);
+  if (hn::AllFalse(d, hn::Or(shadow.wanted, bounce.alive))) {
+    for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
+    return;
+  }
+  // Beyond a rough bounce the cone widens by roughly the lobe's width, whose solid angle is about 1 / pdf.
+  const Real<D> lobe = hn::Min(Splat(d, 0.25) / hn::Sqrt(hn::Max(bounce.pdf, Splat(d, 1e-6))), Splat(d, 0.5));
+  const Real<D> spread = PathReal(d, v.path, offsetof(PathState, cone_spread)) + lobe;
+  const Uint<D> flags = hn::Or(v.depth + hn::Set(du, 1),
+                               hn::IfThenElseZero(hn::RebindMask(du, bounce.alive), hn::Set(du, kPathAlive)));
+  StoreVec3(d, list, offsetof(PathState, origin), s.origin);
+  StoreWord(d, list, offsetof(PathState, tnear), zero);
+  StoreVec3(d, list, offsetof(PathState, direction), bounce.direction);
+  StoreWord(d, list, offsetof(PathState, pdf), bounce.pdf);
+  StoreVec3(d, list, offsetof(PathState, throughput), bounce.throughput);
+  StoreWord(d, list, offsetof(PathState, cone_width), v.cone_width);
+  StoreWord(d, list, offsetof(PathState, cone_spread), spread);
+  StoreWord(d, list, offsetof(PathState, flags), flags);
+  StoreVec3(d, list, offsetof(PathState, shadow_direction), shadow.direction);
+  StoreWord(d, list, offsetof(PathState, shadow_distance), hn::IfThenElseZero(shadow.wanted, shadow.distance));
+  StoreVec3(d, list, offsetof(PathState, shadow_radiance), shadow.radiance);
+  StoreWord(d, list, offsetof(PathState, normal), s.packed_normal);
+  for (size_t i = 0; i < list.count; ++i) {
+    const PathState& path = *list.path[i];
+    const bool alive = (path.flags & kPathAlive) != 0;
+    next[list.lane[i]] = path.shadow_distance > 0 ? Next::shadow : alive ? Next::trace : Next::film;
+  }
+}
+
+/// Ends paths that gather nothing more.
+template <class D>
+HWY_INLINE void EndPaths(D d, const Vertex<D>& v, Mask<D> lanes, Next* next) {
+  const LaneList<D> list = ListLanes(d, v.path, lanes);
+  StoreVec3(d, list, offsetof(PathState, radiance), v.radiance);
+  for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
+}
+
+template <class D>
+HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p, Next* next) {
+  Vertex<D> v = LoadVertex(d, c, p);
+  const Rgba<D> base = BaseColor(d, c, v.at, v.footprint, p.active);
+
+  const Mask<D> passes = PassesThrough(d, c, v, base.a, p.active);
+  if (!hn::AllFalse(d, passes)) ContinueThrough(d, v, passes, next);
+  Mask<D> active = hn::AndNot(passes, p.active);
+  if (hn::AllFalse(d, active)) return;
+
+  v.surface.shading = MappedNormal(d, c, v.at, v.surface, v.footprint, active);
+  v.surface.shading = FaceViewer(d, v.surface.shading, v.toward);
+  if (c.first_hits) RecordFirstHit(d, c, v, base.rgb, v.surface.shading, active);
+
+  const Mask<D> unlit = hn::And(active, MaterialHas(d, c, v.at.material, kMaterialUnlit));
+  v.radiance = Select<D>(unlit, Add<D>(v.radiance, Mul<D>(v.throughput, base.rgb)), v.radiance);
+  AddEmission(d, c, v, hn::AndNot(unlit, active));
+
+  const Mask<D> deep = hn::RebindMask(d, hn::Ge(v.depth, hn::Set(UintTag<D>(), c.max_depth)));
+  const Mask<D> ends = hn::And(active, hn::Or(unlit, deep));
+  if (!hn::AllFalse(d, ends)) EndPaths(d, v, ends, next);
+  active = hn::AndNot(ends, active);
+  if (hn::AllFalse(d, active)) return;
+
+  Scatter<D> s;
+  s.origin = OffsetOrigin(d, v.surface);
+  s.packed_normal = EncodeNormal(d, v.surface.shading);
+  s.frame = MakeFrame(d, v.surface.shading);
+  s.wo = ToLocal(s.frame, v.toward);
+  s.bsdf = PrepareBsdf(d, c.bsdf, MaterialParams(d, c, v, base.rgb, active), s.wo);
+  const ShadowRay<D> shadow = NextEvent(d, c, v, s, active);
+  const Bounce<D> bounce = SampleBounce(d, c, v, s, active);
+  StoreVertex(d, v, s, shadow, bounce, active, next);
+}
+
+/// Paths that left the scene gather the environment, weighted against light sampling, and end.
+template <class D>
+HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
+  if (c.lights.environment.width == 0) return;
+  const Vec3<D> direction = PathVec3(d, p, offsetof(PathState, direction));
+  const Real<D> pdf = PathReal(d, p, offsetof(PathState, pdf));
+  const Mask<D> bounced = hn::Gt(pdf, hn::Zero(d));
+  Real<D> weight = Splat(d, 1);
+  if (!hn::AllFalse(d, bounced)) {
+    const Real<D> light_pdf = LightPdfForEnvironment(d, c.lights, direction);
+    weight = hn::IfThenElse(bounced, PowerHeuristic(d, pdf, light_pdf), weight);
+  }
+  const Vec3<D> throughput = PathVec3(d, p, offsetof(PathState, throughput));
+  const Vec3<D> environment = EnvironmentRadiance(d, c.lights.environment, direction);
+  const Vec3<D> sum = Add<D>(PathVec3(d, p, offsetof(PathState, radiance)),
+                             Scale(Mul<D>(throughput, environment), weight));
+  StoreVec3(d, ListLanes(d, p, p.active), offsetof(PathState, radiance), sum);
+}
+
+/// Opacity of one point for shadow rays, from the finest mip level.
+template <class D>
+HWY_INLINE Real<D> PointOpacity(D d, const KernelContext& c, int32_t placement, uint32_t primitive,
+                                float u, float v) {
+  const IntTag<D> di;
+  const SurfacePoint<D> at = MakeSurfacePoint(d, c, hn::Set(di, placement),
+                                              hn::Set(di, static_cast<int32_t>(primitive)),
+                                              Splat(d, u), Splat(d, v));
+  const TextureFootprint<D> finest = {TextureCoordinates(d, c, at, hn::Zero(di)), Splat(d, -100), hn::Zero(d)};
+  const Mask<D> all = hn::FirstN(d, hn::Lanes(d));
+  return Opacity(d, c, at, BaseColor(d, c, at, finest, all).a);
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

@@ -1,0 +1,355 @@
+// What a ray hit: position with its error bound, normals, texture coordinates and footprint, material values.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_SURFACE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_SURFACE_INL_H_
+#undef CARPOOL_STAGES_KERNELS_SURFACE_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_SURFACE_INL_H_
+#endif
+
+#include "stages/kernels/kernels.h"
+#include "stages/kernels/texture-inl.h"
+#include "stages/kernels/triangle-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// A point on a triangle of the scene, by barycentrics of vertices 1 and 2.
+template <class D>
+struct SurfacePoint {
+  Int<D> placement, material;
+  TriangleIndices<D> index;
+  Real<D> b0, b1, b2;
+};
+
+template <class D>
+HWY_INLINE SurfacePoint<D> MakeSurfacePoint(D d, const KernelContext& c, Int<D> placement,
+                                            Int<D> primitive, Real<D> b1, Real<D> b2) {
+  const Real<D> b0 = hn::Max(Splat(d, 1) - b1 - b2, hn::Zero(d));
+  return {placement, FieldInt(d, c.geometry.placements, placement, offsetof(Placement, material)),
+          GatherTriangleIndices(d, c.geometry, placement, primitive), b0, b1, b2};
+}
+
+/// The shape of the surface at a hit. Normals face the side that the ray came from.
+template <class D>
+struct Surface {
+  Vec3<D> position;     // recomputed from barycentrics
+  Vec3<D> error;        // componentwise bound on its distance to the triangle that Embree sees
+  Vec3<D> geometric;    // unit normal of the triangle
+  Vec3<D> shading;      // interpolated, unit
+  Real<D> twice_area;
+  Mask<D> back;         // the ray hit the side that glTF calls the back
+};
+
+/// Interpolates `size` <= 4 floats per vertex of one stream.
+template <class D>
+HWY_INLINE Real<D> Interpolate(D d, const float* floats, const SurfacePoint<D>& at, Int<D> base,
+                               int stride, int component) {
+  const IntTag<D> di;
+  const auto vertex = [&](Int<D> i) HWY_ATTR {
+    return GatherReal(d, floats, base + i * hn::Set(di, stride) + hn::Set(di, component));
+  };
+  return hn::MulAdd(at.b0, vertex(at.index.i0),
+                    hn::MulAdd(at.b1, vertex(at.index.i1), at.b2 * vertex(at.index.i2)));
+}
+
+template <class D>
+HWY_INLINE Mask<D> IsPresent(D d, Int<D> offset) {
+  return hn::RebindMask(d, hn::Ge(offset, hn::Zero(IntTag<D>())));
+}
+
+/// Normals of object space to world space, unnormalised; outward stays outward under mirroring.
+template <class D>
+HWY_INLINE Vec3<D> NormalToWorld(D d, const GeometryView& g, Int<D> placement, const Vec3<D>& n) {
+  const auto row = [&](size_t i) HWY_ATTR {
+    return Dot(FieldVec3(d, g.placements, placement, offsetof(Placement, normal_to_world) + 12 * i), n);
+  };
+  return {row(0), row(1), row(2)};
+}
+
+template <class D>
+HWY_INLINE Vec3<D> VectorToWorld(D d, const GeometryView& g, Int<D> placement, const Vec3<D>& v) {
+  const auto row = [&](size_t i) HWY_ATTR {
+    return Dot(FieldVec3(d, g.placements, placement, offsetof(Placement, object_to_world) + 16 * i), v);
+  };
+  return {row(0), row(1), row(2)};
+}
+
+template <class D>
+HWY_INLINE Mask<D> PlacementHas(D d, const GeometryView& g, Int<D> placement, int32_t flag) {
+  const Int<D> flags = FieldInt(d, g.placements, placement, offsetof(Placement, flags));
+  return hn::RebindMask(d, hn::TestBit(flags, hn::Set(IntTag<D>(), flag)));
+}
+
+template <class D>
+HWY_INLINE Vec3<D> MaxAbs3(const Triangle<D>& t) {
+  const auto most = [](Real<D> a, Real<D> b, Real<D> c) HWY_ATTR {
+    return hn::Max(hn::Abs(a), hn::Max(hn::Abs(b), hn::Abs(c)));
+  };
+  return {most(t.p0.x, t.p1.x, t.p2.x), most(t.p0.y, t.p1.y, t.p2.y), most(t.p0.z, t.p1.z, t.p2.z)};
+}
+
+/// Bound on how far the recomputed position, and Embree's own idea of the plane, may be off. Flat
+/// triangles: interpolation errs by gamma(5) and the intersector's differences to the ray origin by a few
+/// more ulps of the largest vertex coordinate, not of the hit's (vertices may be far from it). Instanced ones
+/// add the transforms of vertices, origin and direction, relative to |M||p| + |t|.
+template <class D>
+HWY_INLINE Vec3<D> PositionError(D d, const GeometryView& g, Int<D> placement, Mask<D> instanced,
+                                 const Triangle<D>& t) {
+  constexpr double kUlp = 0x1p-24;
+  Vec3<D> error = Scale(MaxAbs3(t), Splat(d, 10 * kUlp));
+  if (!hn::AllFalse(d, instanced)) {
+    const auto row = [&](size_t i) HWY_ATTR {
+      const size_t at = offsetof(Placement, object_to_world) + 16 * i + 12;
+      return hn::Abs(FieldReal(d, g.placements, placement, at));
+    };
+    const Vec3<D> translation = {row(0), row(1), row(2)};
+    const Real<D> largest = hn::Max(MaxComponent(translation), MaxComponent(MaxAbs3(t)));
+    const Real<D> more = largest * Splat(d, 32 * kUlp);
+    const Vec3<D> wider = Add<D>(error, {more, more, more});
+    error = Select<D>(instanced, wider, error);
+  }
+  return error;
+}
+
+template <class D>
+HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoint<D>& at,
+                                  Int<D> primitive, const Vec3<D>& ray_direction) {
+  const Triangle<D> t = TriangleVertices(d, c.geometry, at.placement, primitive);
+  const Mask<D> instanced = PlacementHas(d, c.geometry, at.placement, kPlacementInstanced);
+
+  Surface<D> s;
+  s.position = MulAdd(t.p1, at.b1, MulAdd(t.p2, at.b2, Scale(t.p0, at.b0)));
+  s.error = PositionError(d, c.geometry, at.placement, instanced, t);
+
+  const Vec3<D> toward = Neg<D>(ray_direction);
+  const Vec3<D> area_normal = TriangleAreaNormal(t);
+  s.twice_area = hn::Sqrt(Dot(area_normal, area_normal));
+  const Vec3<D> front = SafeNormalize(d, area_normal, toward);  // zero area: facing the ray
+  s.back = hn::Lt(Dot(front, toward), hn::Zero(d));
+  s.geometric = Select<D>(s.back, Neg<D>(front), front);
+
+  const Int<D> normals = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, normals));
+  const Mask<D> smooth = IsPresent(d, normals);
+  s.shading = s.geometric;
+  if (!hn::AllFalse(d, smooth)) {
+    const Int<D> base = hn::Max(normals, hn::Zero(IntTag<D>()));
+    Vec3<D> n = {Interpolate(d, c.geometry.floats, at, base, 3, 0),
+                 Interpolate(d, c.geometry.floats, at, base, 3, 1),
+                 Interpolate(d, c.geometry.floats, at, base, 3, 2)};
+    if (!hn::AllFalse(d, instanced)) {
+      n = Select<D>(instanced, NormalToWorld(d, c.geometry, at.placement, n), n);
+    }
+    n = SafeNormalize(d, n, front);
+    n = Select<D>(s.back, Neg<D>(n), n);
+    s.shading = Select<D>(smooth, n, s.geometric);
+  }
+  return s;
+}
+
+/// Texture coordinates of one set; (0, 0) where the shape has no such set.
+template <class D>
+HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const SurfacePoint<D>& at, Int<D> set) {
+  const IntTag<D> di;
+  const Int<D> zero = hn::Zero(di);
+  const Int<D> uvs = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uvs));
+  const Int<D> sets = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uv_sets));
+  const Mask<D> present = hn::And(IsPresent(d, uvs), hn::RebindMask(d, hn::Lt(set, sets)));
+  if (hn::AllFalse(d, present)) return {hn::Zero(d), hn::Zero(d)};
+  const auto vertex = [&](Int<D> i, int component) HWY_ATTR {
+    const Int<D> word = uvs + (i * sets + set) * hn::Set(di, 2) + hn::Set(di, component);
+    return GatherReal(d, c.geometry.floats, hn::IfThenElse(hn::RebindMask(di, present), word, zero));
+  };
+  const auto mix = [&](int component) HWY_ATTR {
+    const Real<D> value =
+        hn::MulAdd(at.b0, vertex(at.index.i0, component),
+                   hn::MulAdd(at.b1, vertex(at.index.i1, component),
+                              at.b2 * vertex(at.index.i2, component)));
+    return hn::IfThenElseZero(present, value);
+  };
+  return {mix(0), mix(1)};
+}
+
+/// Twice the triangle's area in the first set of texture coordinates.
+template <class D>
+HWY_INLINE Real<D> TwiceTextureArea(D d, const KernelContext& c, const SurfacePoint<D>& at) {
+  const IntTag<D> di;
+  const Int<D> uvs = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uvs));
+  const Int<D> sets = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uv_sets));
+  const Mask<D> present = IsPresent(d, uvs);
+  const auto vertex = [&](Int<D> i, int component) HWY_ATTR {
+    const Int<D> word = uvs + i * sets * hn::Set(di, 2) + hn::Set(di, component);
+    return GatherReal(d, c.geometry.floats,
+                      hn::IfThenElse(hn::RebindMask(di, present), word, hn::Zero(di)));
+  };
+  const Real<D> u0 = vertex(at.index.i0, 0), v0 = vertex(at.index.i0, 1);
+  const Real<D> u1 = vertex(at.index.i1, 0) - u0, v1 = vertex(at.index.i1, 1) - v0;
+  const Real<D> u2 = vertex(at.index.i2, 0) - u0, v2 = vertex(at.index.i2, 1) - v0;
+  return hn::IfThenElseZero(present, hn::Abs(DifferenceOfProducts(u1, v2, u2, v1)));
+}
+
+/// log2 with the mantissa taken as linear: within 0.09, which is plenty to choose a mip level.
+template <class D>
+HWY_INLINE Real<D> RoughLog2(D d, Real<D> x) {
+  const Real<D> bits = hn::ConvertTo(d, hn::BitCast(IntTag<D>(), hn::Max(x, Splat(d, 1e-30))));
+  return hn::MulAdd(bits, Splat(d, 0x1p-23), Splat(d, -127));
+}
+
+/// Where textures are read: coordinates of the first set and what the ray cone covers there.
+template <class D>
+struct TextureFootprint {
+  Vec2<D> uv;            // of set 0
+  Real<D> log2_width;    // of the cone, in texture coordinates; very negative: finest level
+  Real<D> u_level;       // chooses between neighbouring mip levels
+};
+
+/// Reads one texture slot of each lane's material; `absent` where the material has none.
+template <class D>
+HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const SurfacePoint<D>& at,
+                                   const TextureFootprint<D>& footprint, Slot which, Mask<D> active,
+                                   double absent) {
+  const IntTag<D> di;
+  const Real<D> fill = Splat(d, absent);
+  const Rgba<D> none = {{fill, fill, fill}, fill};
+  const Int<D> slot = FieldInt(d, c.materials, at.material,
+                               offsetof(Material, slots) + 4 * static_cast<size_t>(which));
+  active = hn::And(active, IsPresent(d, slot));
+  if (hn::AllFalse(d, active)) return none;
+
+  const Int<D> valid = hn::IfThenElseZero(hn::RebindMask(di, active), slot);
+  const Int<D> set = hn::IfThenElseZero(hn::RebindMask(di, active),
+                                        FieldInt(d, c.textures.slots, valid, offsetof(TextureSlot, uv_set)));
+  Vec2<D> uv = footprint.uv;
+  const Mask<D> other_set = hn::RebindMask(d, hn::Gt(set, hn::Zero(di)));
+  if (!hn::AllFalse(d, other_set)) {
+    const Vec2<D> other = TextureCoordinates(d, c, at, set);
+    uv = {hn::IfThenElse(other_set, other.x, uv.x), hn::IfThenElse(other_set, other.y, uv.y)};
+  }
+  const Rgba<D> texel =
+      SampleTexture(d, c.textures, valid, active, uv, footprint.log2_width, footprint.u_level);
+  return {Select<D>(active, texel.rgb, none.rgb), hn::IfThenElse(active, texel.a, none.a)};
+}
+
+/// Vertex colour times factor times texture.
+template <class D>
+HWY_INLINE Rgba<D> BaseColor(D d, const KernelContext& c, const SurfacePoint<D>& at,
+                             const TextureFootprint<D>& footprint, Mask<D> active) {
+  const Vec3<D> factor = FieldVec3(d, c.materials, at.material, offsetof(Material, base_color));
+  const Real<D> alpha = FieldReal(d, c.materials, at.material, offsetof(Material, base_color) + 12);
+  const Rgba<D> texel = MaterialTexture(d, c, at, footprint, Slot::base_color, active, 1);
+  Rgba<D> color = {Mul<D>(factor, texel.rgb), alpha * texel.a};
+
+  const Int<D> colors = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, colors));
+  const Mask<D> colored = hn::And(active, IsPresent(d, colors));
+  if (!hn::AllFalse(d, colored)) {
+    const Int<D> base = hn::Max(colors, hn::Zero(IntTag<D>()));
+    const auto channel = [&](int i) HWY_ATTR {
+      const Real<D> value = Interpolate(d, c.geometry.floats, at, base, 4, i);
+      return hn::IfThenElse(colored, value, Splat(d, 1));
+    };
+    color.rgb = Mul<D>(color.rgb, {channel(0), channel(1), channel(2)});
+    color.a = color.a * channel(3);
+  }
+  return color;
+}
+
+/// How much of the surface is there, by alphaMode: 1, a step at the cutoff, or alpha itself.
+template <class D>
+HWY_INLINE Real<D> Opacity(D d, const KernelContext& c, const SurfacePoint<D>& at, Real<D> alpha) {
+  const IntTag<D> di;
+  const Int<D> mode = FieldInt(d, c.materials, at.material, offsetof(Material, alpha_mode));
+  const auto is = [&](AlphaMode m) HWY_ATTR {
+    return hn::RebindMask(d, hn::Eq(mode, hn::Set(di, static_cast<int32_t>(m))));
+  };
+  const Real<D> one = Splat(d, 1);
+  const Real<D> cutoff = FieldReal(d, c.materials, at.material, offsetof(Material, alpha_cutoff));
+  const Real<D> step = hn::IfThenElseZero(hn::Ge(alpha, cutoff), one);
+  const Real<D> clamped = hn::Min(hn::Max(alpha, hn::Zero(d)), one);
+  return hn::IfThenElse(is(AlphaMode::mask), step, hn::IfThenElse(is(AlphaMode::blend), clamped, one));
+}
+
+/// Emitted radiance at a point, always from the finest mip level: seen directly, reached by BSDF sampling
+/// and by light sampling it is the same function, as MIS needs.
+template <class D>
+HWY_INLINE Vec3<D> EmittedRadiance(D d, const KernelContext& c, const SurfacePoint<D>& at,
+                                   const Vec2<D>& uv, Mask<D> active) {
+  const TextureFootprint<D> finest = {uv, Splat(d, -100), hn::Zero(d)};
+  const Rgba<D> texel = MaterialTexture(d, c, at, finest, Slot::emissive, active, 1);
+  return Mul<D>(FieldVec3(d, c.materials, at.material, offsetof(Material, emissive)), texel.rgb);
+}
+
+template <class D>
+HWY_INLINE Mask<D> MaterialHas(D d, const KernelContext& c, Int<D> material, int32_t flag) {
+  const Int<D> flags = FieldInt(d, c.materials, material, offsetof(Material, flags));
+  return hn::RebindMask(d, hn::TestBit(flags, hn::Set(IntTag<D>(), flag)));
+}
+
+/// The shading normal bent by the normal map, still facing the viewer's side of the triangle.
+template <class D>
+HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<D>& at,
+                                const Surface<D>& s, const TextureFootprint<D>& footprint, Mask<D> active) {
+  const IntTag<D> di;
+  const Int<D> tangents = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, tangents));
+  const Int<D> slot = FieldInt(d, c.materials, at.material,
+                               offsetof(Material, slots) + 4 * static_cast<size_t>(Slot::normal));
+  active = hn::And(active, hn::And(IsPresent(d, tangents), IsPresent(d, slot)));
+  if (hn::AllFalse(d, active)) return s.shading;
+
+  const Rgba<D> texel = MaterialTexture(d, c, at, footprint, Slot::normal, active, 0.5);
+  const Real<D> scale = FieldReal(d, c.materials, at.material, offsetof(Material, normal_scale));
+  const auto expand = [&](Real<D> v) HWY_ATTR { return hn::MulSub(v, Splat(d, 2), Splat(d, 1)); };
+  const Real<D> x = expand(texel.rgb.x) * scale, y = expand(texel.rgb.y) * scale;
+  const Real<D> z = expand(texel.rgb.z);
+
+  const Int<D> base = hn::Max(tangents, hn::Zero(di));
+  Vec3<D> tangent = {Interpolate(d, c.geometry.floats, at, base, 4, 0),
+                     Interpolate(d, c.geometry.floats, at, base, 4, 1),
+                     Interpolate(d, c.geometry.floats, at, base, 4, 2)};
+  Real<D> handedness = GatherReal(d, c.geometry.floats, base + at.index.i0 * hn::Set(di, 4) + hn::Set(di, 3));
+  const Mask<D> instanced = PlacementHas(d, c.geometry, at.placement, kPlacementInstanced);
+  if (!hn::AllFalse(d, instanced)) {
+    tangent = Select<D>(instanced, VectorToWorld(d, c.geometry, at.placement, tangent), tangent);
+    const Mask<D> mirrored = PlacementHas(d, c.geometry, at.placement, kPlacementMirrored);
+    handedness = hn::IfThenElse(mirrored, hn::Neg(handedness), handedness);
+  }
+  // The map is given for the front; its frame stays that of the front when seen from behind, then flips.
+  const Vec3<D> normal = Select<D>(s.back, Neg<D>(s.shading), s.shading);
+  const Vec3<D> bitangent = Scale(Cross<D>(normal, tangent), handedness);
+  const Vec3<D> bent = MulAdd(tangent, x, MulAdd(bitangent, y, Scale(normal, z)));
+  const Vec3<D> unit = SafeNormalize(d, bent, normal);
+  return Select<D>(active, Select<D>(s.back, Neg<D>(unit), unit), s.shading);
+}
+
+/// Turns a shading normal that faces away from the viewer just far enough back, so that every hit can be shaded.
+template <class D>
+HWY_INLINE Vec3<D> FaceViewer(D d, const Vec3<D>& normal, const Vec3<D>& toward) {
+  const Real<D> least = Splat(d, 1e-3);
+  const Real<D> cosine = Dot(normal, toward);
+  const Mask<D> away = hn::Lt(cosine, least);
+  if (hn::AllFalse(d, away)) return normal;
+  const Vec3<D> bent = MulAdd(toward, least - cosine, normal);
+  return Select<D>(away, SafeNormalize(d, bent, toward), normal);
+}
+
+/// Moves `p` off the surface along `normal` by the error bound, then one ulp more in each component
+/// (pbrt 6.8.6): the new origin is on the right side of the triangle whatever the rounding was.
+template <class D>
+HWY_INLINE Vec3<D> OffsetOrigin(D d, const Surface<D>& s) {
+  const Vec3<D>& n = s.geometric;
+  const Real<D> distance = hn::MulAdd(hn::Abs(n.x), s.error.x,
+                                      hn::MulAdd(hn::Abs(n.y), s.error.y, hn::Abs(n.z) * s.error.z));
+  const auto moved = [&](Real<D> p, Real<D> axis) HWY_ATTR {
+    const Real<D> offset = axis * distance;
+    const Real<D> o = p + offset;
+    const Real<D> ulp = hn::Abs(o) * Splat(d, 0x1p-23);
+    return o + hn::IfThenElseZero(hn::Ne(offset, hn::Zero(d)), hn::CopySign(ulp, offset));
+  };
+  return {moved(s.position.x, n.x), moved(s.position.y, n.y), moved(s.position.z, n.z)};
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
