@@ -77,7 +77,7 @@ void CheckSize(const RenderSettings& s) {
 
 void CheckPaths(const RenderSettings& s) {
   if (s.scene_path.empty()) Refuse("no scene given; name a .gltf or .glb file");
-  if (!EndsWith(s.output_path, ".exr")) {
+  if (!s.output_path.empty() && !EndsWith(s.output_path, ".exr")) {
     Refuse("--output: '" + s.output_path + "' must end in .exr");
   }
   if (!s.preview_path.empty() && !EndsWith(s.preview_path, ".png")) {

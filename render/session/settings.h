@@ -64,7 +64,7 @@ struct RenderSettings {
 
   // The image.
 
-  std::string output_path = {};  ///< .exr; required
+  std::string output_path = {};  ///< .exr; required by Render()
   /// A .png refreshed while rendering, at first from an interleaved subset of pixels; empty: none.
   std::string preview_path = {};
   bool write_png = true;  ///< also write PngPath(output_path), tone-mapped

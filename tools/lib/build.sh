@@ -59,10 +59,10 @@ show_progress() {
 # build PRESET [TARGET...] builds the targets, or all; silent where nothing is to be done.
 build() {
   local preset=$1 folder=$carpool_root/build/$1 lock
+  install_missing_packages
   mkdir -p "$carpool_root/build"
   exec {lock}>"$carpool_root/build/$preset.lock"  # two builds at once would write the same files
   flock "$lock"
-  install_missing_packages
   configure "$preset"
   if ! ninja -C "$folder" -j "$(nproc)" "${@:2}" </dev/null 2>&1 | show_progress "$folder/build.log"; then
     cat "$folder/build.log" >&2

@@ -1,0 +1,34 @@
+// The flags that say what to render, shared by the commands that render and that plan.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "render/session/settings.h"
+
+namespace CLI {
+class App;
+}
+
+namespace carpool::tools {
+
+/// What the command line said, before names and sizes are understood. CLI11 writes into it while
+/// parsing, so it must live as long as the command.
+struct RenderFlags {
+  render::RenderSettings settings;
+  std::string size, aovs, executor = "auto", policy = "deepest", isa = "auto";
+  std::optional<int> samples;
+  bool no_png = false, no_robust = false;
+};
+
+/// AddSceneFlags adds what decides which work a render has: scene, view, image, length.
+void AddSceneFlags(CLI::App& command, RenderFlags& flags);
+
+/// AddRunFlags adds the rest: where results go, and how the machine is used.
+void AddRunFlags(CLI::App& command, RenderFlags& flags);
+
+/// Settle returns the settings the flags ask for; throws Error(ExitCode::usage) for what makes no
+/// sense.
+render::RenderSettings Settle(const RenderFlags& flags);
+
+}  // namespace carpool::tools
