@@ -19,6 +19,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
+namespace lights {
 
 /// A place on the map in texels: texel centres are at integers, `s` is in [-1/2, width - 1/2] and `t` in
 /// [-1/2, height - 1/2]; `sin_theta` belongs to the direction and is kept because it is exact there.
@@ -59,7 +60,7 @@ HWY_INLINE EnvironmentPlace<D> PlaceOfDirection(D d, const EnvironmentView& view
 
 /// floor(x) as an integer, and what is left of x.
 template <class D>
-HWY_INLINE Int<D> SplitFloor(D d, Real<D> x, Real<D>& fraction) {
+HWY_INLINE Int<D> SplitFloor(D, Real<D> x, Real<D>& fraction) {
   const Real<D> floor = hn::Floor(x);
   fraction = x - floor;
   return hn::ConvertTo(IntTag<D>(), floor);
@@ -229,6 +230,15 @@ HWY_INLINE EnvironmentSample<D> SampleEnvironment(D d, const EnvironmentView& vi
   return {DirectionOfPlace(d, view, place), InterpolateRadiance(d, view, taps),
           InterpolatePdf(d, view, taps, place.sin_theta)};
 }
+
+}  // namespace lights
+
+using lights::EnvironmentRadiance;
+using lights::EnvironmentPdf;
+using lights::EnvironmentSample;
+using lights::EnvironmentValue;
+using lights::LookUpEnvironment;
+using lights::SampleEnvironment;
 
 }  // namespace carpool::stages::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

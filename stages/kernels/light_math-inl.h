@@ -14,6 +14,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
+namespace lights {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kLargestBelowOne = 0.999999940395355224609375;  // 1 - 2^-24, in float
@@ -60,6 +61,7 @@ HWY_INLINE hn::Mask<IntTag<D>> ToIntMask(D, Mask<D> mask) {
   return hn::RebindMask(IntTag<D>(), mask);
 }
 
+}  // namespace lights
 }  // namespace carpool::stages::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -1,0 +1,230 @@
+// Next-event estimation's one call: chooses a light for each receiver and a direction towards it.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_LIGHT_SAMPLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_LIGHT_SAMPLE_INL_H_
+#undef CARPOOL_STAGES_KERNELS_LIGHT_SAMPLE_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_LIGHT_SAMPLE_INL_H_
+#endif
+
+#include <cstddef>
+
+#include "stages/kernels/environment-inl.h"
+#include "stages/kernels/light_punctual-inl.h"
+#include "stages/kernels/light_tree-inl.h"
+#include "stages/kernels/light_triangle-inl.h"
+#include "stages/kernels/triangle-inl.h"
+#include "stages/tables/light_view.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+namespace lights {
+
+template <class D>
+struct LightSample {
+  Vec3<D> wi;             // unit, from the receiver
+  Real<D> distance;       // to the light; kFarAway where it is infinitely far
+  /// environment: radiance; punctual: irradiance on a surface facing `wi`; triangle: 1, to be multiplied
+  /// by the emission at (b1, b2).
+  Vec3<D> radiance_or_irradiance;
+  Real<D> pdf;            // per solid angle (1 for delta lights) x selection; 0: no sample
+  Mask<D> delta;          // punctual: no other way of finding the light
+  Int<D> light;           // kNone: the environment, or no sample
+  Real<D> b1, b2;         // triangle: barycentrics of p1 and p2
+};
+
+/// The kind of light that each lane's number falls to, in the order tree, infinite, environment.
+template <class D>
+struct KindChoice {
+  Mask<D> tree, infinite, environment;
+  Real<D> u_remapped;
+};
+
+template <class D>
+HWY_INLINE KindChoice<D> ChooseKind(D d, const LightView& view, Mask<D> active, Real<D> u) {
+  const bool has_environment = view.environment_probability > 0;
+  const bool has_infinite = view.infinite_count > 0 && view.infinite_probability > 0;
+  const float infinite = has_infinite ? view.infinite_probability * view.infinite_count : 0;
+  // Rounding may leave the sum a little below 1: the last kind that is present takes the rest.
+  const float tree_end = has_infinite || has_environment ? view.tree_probability : 2.0f;
+  const float infinite_end = has_environment ? view.tree_probability + infinite : 2.0f;
+  const Mask<D> below_tree = hn::Lt(u, Splat(d, tree_end));
+  const Mask<D> below_infinite = hn::Lt(u, Splat(d, infinite_end));
+  const Mask<D> second = hn::AndNot(below_tree, below_infinite);
+
+  const Real<D> in_tree = SafeDiv(d, u, Splat(d, view.tree_probability));
+  const Real<D> in_infinite =
+      SafeDiv(d, u - Splat(d, view.tree_probability), Splat(d, infinite));
+  return {hn::And(active, below_tree), hn::And(active, second),
+          hn::AndNot(hn::Or(below_tree, below_infinite), active),
+          hn::Min(hn::IfThenElse(second, in_infinite, in_tree), Splat(d, kLargestBelowOne))};
+}
+
+/// Lanes of `m` from `b`, the others from `a`.
+template <class D>
+HWY_INLINE LightSample<D> Merge(D d, Mask<D> m, const LightSample<D>& a, const LightSample<D>& b) {
+  return {Select<D>(m, b.wi, a.wi),
+          hn::IfThenElse(m, b.distance, a.distance),
+          Select<D>(m, b.radiance_or_irradiance, a.radiance_or_irradiance),
+          hn::IfThenElse(m, b.pdf, a.pdf),
+          hn::Or(hn::AndNot(m, a.delta), hn::And(m, b.delta)),
+          hn::IfThenElse(ToIntMask(d, m), b.light, a.light),
+          hn::IfThenElse(m, b.b1, a.b1),
+          hn::IfThenElse(m, b.b2, a.b2)};
+}
+
+template <class D>
+HWY_INLINE LightSample<D> NoLight(D d) {
+  const Real<D> zero = hn::Zero(d);
+  const Mask<D> never = hn::Lt(zero, zero);
+  return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0),
+          zero,               never, hn::Set(IntTag<D>(), kNone), zero, zero};
+}
+
+/// `pdf` of the result has no selection in it. A light with one side gives nothing behind it.
+template <class D>
+HWY_INLINE LightSample<D> FromTriangle(D d, const LightView& view, Mask<D> active, Int<D> light,
+                                       const Vec3<D>& ref, const Vec2<D>& u) {
+  const auto lit = ToIntMask(d, active);
+  const auto field = [&](size_t offset) HWY_ATTR {
+    return hn::IfThenElseZero(lit, FieldInt(d, view.lights, light, offset));
+  };
+  const Triangle<D> triangle = TriangleVertices(
+      d, view.geometry, field(offsetof(Light, placement)), field(offsetof(Light, primitive)));
+  const TriangleLightSample<D> s =
+      SampleTriangleLight(d, triangle.p0, triangle.p1, triangle.p2, ref, u);
+  const auto one_sided = ToMask(d, hn::Eq(
+      field(offsetof(Light, type)),
+      hn::Set(IntTag<D>(), static_cast<int32_t>(LightType::triangle))));
+  const Mask<D> behind =
+      hn::Ge(Dot(TriangleAreaNormal<D>(triangle), Sub<D>(triangle.p0, ref)), hn::Zero(d));
+  LightSample<D> sample = NoLight(d);
+  sample.wi = s.wi;
+  sample.distance = s.distance;
+  sample.radiance_or_irradiance = Splat3(d, 1, 1, 1);
+  sample.pdf = hn::IfThenZeroElse(hn::And(one_sided, behind), s.pdf);
+  sample.light = light;
+  sample.b1 = s.b1;
+  sample.b2 = s.b2;
+  return sample;
+}
+
+/// `pdf` of the result has no selection in it.
+template <class D>
+HWY_INLINE LightSample<D> FromPunctual(D d, const LightView& view, Int<D> light,
+                                       const Vec3<D>& ref) {
+  const PunctualSample<D> s = SamplePunctual(d, view.lights, light, ref);
+  const Real<D> zero = hn::Zero(d);
+  LightSample<D> sample = NoLight(d);
+  sample.wi = s.wi;
+  sample.distance = s.distance;
+  sample.radiance_or_irradiance = s.irradiance;
+  sample.pdf = hn::IfThenElseZero(hn::Gt(MaxComponent<D>(s.irradiance), zero), Splat(d, 1));
+  sample.delta = hn::Eq(zero, zero);
+  sample.light = light;
+  return sample;
+}
+
+template <class D>
+HWY_INLINE LightSample<D> FromEnvironment(D d, const LightView& view, const Vec2<D>& u) {
+  const EnvironmentSample<D> s = SampleEnvironment(d, view.environment, u);
+  LightSample<D> sample = NoLight(d);
+  sample.wi = s.dir;
+  sample.distance = Splat(d, kFarAway);
+  sample.radiance_or_irradiance = s.radiance;
+  sample.pdf = s.pdf * Splat(d, view.environment_probability);
+  return sample;
+}
+
+/// The light each lane shall sample, from the tree or from the infinite ones.
+template <class D>
+HWY_INLINE LightPick<D> PickFiniteOrInfinite(D d, const LightView& view,
+                                             const KindChoice<D>& kind, const Vec3<D>& position,
+                                             const Vec3<D>& normal) {
+  LightPick<D> pick = {hn::Set(IntTag<D>(), kNone), hn::Zero(d), kind.u_remapped};
+  if (!hn::AllFalse(d, kind.tree)) {
+    pick = PickLight(d, view, kind.tree, position, normal, kind.u_remapped);
+    pick.probability = pick.probability * Splat(d, view.tree_probability);
+  }
+  if (!hn::AllFalse(d, kind.infinite)) {
+    const IntTag<D> di;
+    const Int<D> which =
+        hn::ConvertTo(di, kind.u_remapped * Splat(d, static_cast<double>(view.infinite_count)));
+    const Int<D> last = hn::Set(di, view.infinite_count - 1);
+    const Int<D> light =
+        GatherInt(d, view.infinite_lights, hn::Min(hn::Max(which, hn::Zero(di)), last));
+    pick.light = hn::IfThenElse(ToIntMask(d, kind.infinite), light, pick.light);
+    pick.probability =
+        hn::IfThenElse(kind.infinite, Splat(d, view.infinite_probability), pick.probability);
+  }
+  return pick;
+}
+
+/// One sample of all light that may reach each active receiver. `normal` is unit length on the side that
+/// takes light, or zero for a receiver that takes it from all sides.
+template <class D>
+HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active,
+                                      const Vec3<D>& position, const Vec3<D>& normal,
+                                      Real<D> u_pick, const Vec2<D>& u) {
+  LightSample<D> sample = NoLight(d);
+  const bool any = view.tree_probability > 0 || view.environment_probability > 0 ||
+                   (view.infinite_count > 0 && view.infinite_probability > 0);
+  if (!any) return sample;
+  const KindChoice<D> kind = ChooseKind(d, view, active, u_pick);
+  if (!hn::AllFalse(d, kind.environment)) {
+    sample = Merge(d, kind.environment, sample, FromEnvironment(d, view, u));
+  }
+  const LightPick<D> pick = PickFiniteOrInfinite(d, view, kind, position, normal);
+  const IntTag<D> di;
+  const auto picked = hn::Gt(pick.light, hn::Set(di, kNone));
+  const Mask<D> has_light = hn::AndNot(kind.environment, hn::And(active, ToMask(d, picked)));
+  if (hn::AllFalse(d, has_light)) return sample;
+
+  const Int<D> light = hn::IfThenElseZero(ToIntMask(d, has_light), pick.light);
+  const Int<D> type = FieldInt(d, view.lights, light, offsetof(Light, type));
+  const Mask<D> triangle = hn::And(
+      has_light, ToMask(d, hn::Lt(type, hn::Set(di, kLastTriangleType + 1))));
+  const Mask<D> punctual = hn::AndNot(triangle, has_light);
+  if (!hn::AllFalse(d, triangle)) {
+    sample = Merge(d, triangle, sample, FromTriangle(d, view, triangle, light, position, u));
+  }
+  if (!hn::AllFalse(d, punctual)) {
+    sample = Merge(d, punctual, sample, FromPunctual(d, view, light, position));
+  }
+  sample.pdf = hn::IfThenElse(has_light, sample.pdf * pick.probability, sample.pdf);
+  return sample;
+}
+
+/// Density with which `SampleLight` at `position` returns the point of the triangle light `light` that
+/// lies at `distance` along the unit `wi`; all else as it was given there.
+template <class D>
+HWY_INLINE Real<D> LightPdfForTriangleHit(D d, const LightView& view, Mask<D> active,
+                                          const Vec3<D>& position, const Vec3<D>& normal,
+                                          Int<D> light, const Vec3<D>& p0, const Vec3<D>& p1,
+                                          const Vec3<D>& p2, const Vec3<D>& wi, Real<D> distance) {
+  if (view.tree_probability <= 0 || hn::AllFalse(d, active)) return hn::Zero(d);
+  const Real<D> selection = PickProbability(d, view, active, position, normal, light);
+  return Splat(d, view.tree_probability) * selection *
+         TriangleLightPdf(d, p0, p1, p2, position, wi, distance);
+}
+
+/// Density with which `SampleLight` returns the unit direction `dir` by way of the environment.
+template <class D>
+HWY_INLINE Real<D> LightPdfForEnvironment(D d, const LightView& view, const Vec3<D>& dir) {
+  if (view.environment_probability <= 0) return hn::Zero(d);
+  return EnvironmentPdf(d, view.environment, dir) * Splat(d, view.environment_probability);
+}
+
+}  // namespace lights
+
+using lights::LightPdfForEnvironment;
+using lights::LightPdfForTriangleHit;
+using lights::LightSample;
+using lights::SampleLight;
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

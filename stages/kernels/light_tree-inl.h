@@ -1,0 +1,233 @@
+// Picks one light of many by descending the light tree, and tells with what probability it would.
+//
+// Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting": at each
+// node the two children compete by a bound of what they may contribute to the receiver, and one number
+// in [0, 1) decides, remapped on the way.
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_LIGHT_TREE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_LIGHT_TREE_INL_H_
+#undef CARPOOL_STAGES_KERNELS_LIGHT_TREE_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_LIGHT_TREE_INL_H_
+#endif
+
+#include <cstddef>
+
+#include "stages/kernels/light_math-inl.h"
+#include "stages/tables/light_view.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+namespace lights {
+
+/// A light of the tree, and the probability of having picked it from the tree.
+template <class D>
+struct LightPick {
+  Int<D> light;          // kNone: no light of the tree can reach the receiver
+  Real<D> probability;   // 0 with kNone
+  Real<D> u_remapped;    // in [0, 1), uniform again given the light
+};
+
+/// Where light is to arrive. A zero normal means a receiver that takes light from all sides alike.
+template <class D>
+struct Receiver {
+  Vec3<D> position, normal;
+  Mask<D> all_sides;
+};
+template <class D>
+HWY_INLINE Receiver<D> MakeReceiver(D d, const Vec3<D>& position, const Vec3<D>& normal) {
+  return {position, normal, hn::Not(hn::Gt(Dot(normal, normal), hn::Zero(d)))};
+}
+
+// Bounds come from rounded numbers, so nothing is culled by less than this difference of cosines, and
+// what is not culled keeps at least this share of its unoccluded, perpendicular importance.
+constexpr double kCullMargin = 1e-3;
+constexpr double kLeastEmission = 1e-3;
+// Receivers below the horizon of a shading normal may still take light (transmission, bump maps).
+constexpr double kLeastReception = 0.02;
+// Powers are shares of 1, so that with this least squared distance no importance overflows.
+constexpr double kLeastSquaredDistance = 1e-30;
+constexpr double kLeastImportance = 1e-37;
+constexpr double kLeastShare = 1.0 / 1024;  // of a child among the two, if it may contribute at all
+
+/// Cosine bound of the emitters' normals: 0 where nothing of the cluster can shine towards the receiver.
+/// `cos_w` is between the axis and the direction from the cluster's centre to the receiver.
+template <class D>
+HWY_INLINE Real<D> EmissionBound(D d, const LightNode* nodes, Int<D> node, Real<D> cos_w,
+                                 const Angle<D>& subtended) {
+  const Mask<D> two_sided = ToMask(
+      d, hn::Ne(FieldInt(d, nodes, node, offsetof(LightNode, two_sided)), hn::Zero(IntTag<D>())));
+  const Angle<D> w = AngleFromCos(d, hn::IfThenElse(two_sided, hn::Abs(cos_w), cos_w));
+  const Angle<D> o = {FieldReal(d, nodes, node, offsetof(LightNode, cos_theta_o)),
+                      FieldReal(d, nodes, node, offsetof(LightNode, sin_theta_o))};
+  const Real<D> cos = SubtractClamped(d, SubtractClamped(d, w, o), subtended).cos;
+  const Real<D> cos_e = FieldReal(d, nodes, node, offsetof(LightNode, cos_theta_e));
+  return hn::IfThenElseZero(hn::Gt(cos, cos_e - Splat(d, kCullMargin)),
+                            hn::Max(cos, Splat(d, kLeastEmission)));
+}
+
+/// Bound of the receiver's cosine over the cluster; `cos_i` is towards the cluster's centre.
+template <class D>
+HWY_INLINE Real<D> ReceptionBound(D d, const Receiver<D>& receiver, Real<D> cos_i,
+                                  const Angle<D>& subtended) {
+  const Real<D> cos = SubtractClamped(d, AngleFromCos(d, cos_i), subtended).cos;
+  return hn::IfThenElse(receiver.all_sides, Splat(d, 1), hn::Max(cos, Splat(d, kLeastReception)));
+}
+
+/// What the cluster under `node` may contribute to the receiver, up to a factor common to all nodes.
+template <class D>
+HWY_INLINE Real<D> Importance(D d, const LightNode* nodes, Int<D> node,
+                              const Receiver<D>& receiver) {
+  const Vec3<D> center = FieldVec3(d, nodes, node, offsetof(LightNode, center));
+  const Real<D> radius = FieldReal(d, nodes, node, offsetof(LightNode, radius));
+  const Vec3<D> axis = FieldVec3(d, nodes, node, offsetof(LightNode, axis));
+  const Real<D> power = FieldReal(d, nodes, node, offsetof(LightNode, power));
+
+  const Vec3<D> away = Sub<D>(receiver.position, center);
+  const Real<D> squared = Dot(away, away), squared_radius = radius * radius;
+  const Mask<D> outside = hn::Gt(squared, squared_radius);
+  const Real<D> inverse = SafeDiv(d, Splat(d, 1), hn::Sqrt(squared));
+  // Inside the sphere the cluster may lie in any direction: an angle of pi takes every bound to 1.
+  const Real<D> sin_b = hn::IfThenElseZero(outside, radius * inverse);
+  const Real<D> cos_b = hn::IfThenElse(
+      outside, SafeSqrt(d, hn::NegMulAdd(sin_b, sin_b, Splat(d, 1))), Splat(d, -1));
+  const Angle<D> subtended = {cos_b, sin_b};
+
+  const Real<D> emission =
+      EmissionBound(d, nodes, node, hn::IfThenElse(outside, Dot(axis, away) * inverse, Splat(d, 1)),
+                    subtended);
+  const Real<D> reception = ReceptionBound(
+      d, receiver, hn::IfThenElse(outside, hn::Neg(Dot(receiver.normal, away)) * inverse, Splat(d, 1)),
+      subtended);
+  const Real<D> floor = hn::Max(squared_radius, Splat(d, kLeastSquaredDistance));
+  const Real<D> importance = power * (emission * reception) / hn::Max(squared, floor);
+  return hn::IfThenElseZero(hn::Gt(emission, hn::Zero(d)),
+                            hn::Max(importance, Splat(d, kLeastImportance)));
+}
+
+/// Probability of the left child of a pair with these importances, of which one is > 0. Bounds can be
+/// wrong by any factor (a bright light behind a wall), so neither child that may contribute is starved.
+template <class D>
+HWY_INLINE Real<D> LeftProbability(D d, Real<D> left, Real<D> right) {
+  const Real<D> zero = hn::Zero(d), one = Splat(d, 1), least = Splat(d, kLeastShare);
+  const Real<D> shared = hn::Min(hn::Max(SafeDiv(d, left, left + right), least), one - least);
+  return hn::IfThenElseZero(hn::Gt(left, zero), hn::IfThenElse(hn::Gt(right, zero), shared, one));
+}
+
+/// A stream of numbers in [0, 1) that refills the bits which remapping uses up: a descent through many
+/// rare branches would otherwise decide on zeros. Mixing function: C. Wellons' "lowbias32".
+template <class D>
+struct Refill {
+  Uint<D> state;
+
+  HWY_INLINE Refill(D, const Vec3<D>& position, Real<D> u) {
+    const UintTag<D> du;
+    state = hn::BitCast(du, u);
+    for (const Real<D>& seed : {position.x, position.y, position.z}) {
+      state = Mix(state + hn::BitCast(du, seed) + hn::Set(du, 0x9e3779b9u));
+    }
+  }
+  HWY_INLINE Real<D> Next(D d) {
+    const UintTag<D> du;
+    state = Mix(state + hn::Set(du, 0x9e3779b9u));
+    const auto bits = hn::BitCast(IntTag<D>(), hn::ShiftRight<8>(state));
+    return hn::ConvertTo(d, bits) * Splat(d, 1.0 / (1 << 24));
+  }
+
+ private:
+  static HWY_INLINE Uint<D> Mix(Uint<D> x) {
+    const UintTag<D> du;
+    x = (x ^ hn::ShiftRight<16>(x)) * hn::Set(du, 0x7feb352du);
+    x = (x ^ hn::ShiftRight<15>(x)) * hn::Set(du, 0x846ca68bu);
+    return x ^ hn::ShiftRight<16>(x);
+  }
+};
+
+/// Descends from the root in every active lane, with one number per lane.
+template <class D>
+HWY_INLINE LightPick<D> PickLight(D d, const LightView& view, Mask<D> active,
+                                  const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
+  const IntTag<D> di;
+  const Int<D> zero = hn::Zero(di), none = hn::Set(di, kNone);
+  const Receiver<D> receiver = MakeReceiver(d, position, normal);
+  LightPick<D> pick = {none, hn::IfThenElseZero(active, Splat(d, 1)), u};
+  if (view.node_count == 0) return {none, hn::Zero(d), u};
+
+  Refill<D> refill(d, position, u);
+  Int<D> node = zero;
+  while (!hn::AllFalse(d, active)) {
+    const Int<D> child = FieldInt(d, view.nodes, node, offsetof(LightNode, child_or_light));
+    const Mask<D> leaf = hn::And(active, ToMask(d, hn::Lt(child, zero)));
+    pick.light = hn::IfThenElse(ToIntMask(d, leaf), hn::Not(child), pick.light);
+    active = hn::AndNot(leaf, active);
+    if (hn::AllFalse(d, active)) break;
+
+    const Int<D> left = hn::IfThenElseZero(ToIntMask(d, active), child);
+    const Int<D> right = left + hn::Set(di, 1);
+    const Real<D> left_importance = Importance(d, view.nodes, left, receiver);
+    const Real<D> right_importance = Importance(d, view.nodes, right, receiver);
+    const Real<D> sum = left_importance + right_importance;
+    const Mask<D> dark = hn::And(active, hn::Not(hn::Gt(sum, hn::Zero(d))));
+    pick.probability = hn::IfThenZeroElse(dark, pick.probability);
+    active = hn::AndNot(dark, active);
+
+    const Real<D> p = LeftProbability(d, left_importance, right_importance);
+    const Mask<D> go_left = hn::Lt(pick.u_remapped, p);
+    const Real<D> q = hn::IfThenElse(go_left, p, Splat(d, 1) - p);
+    const Real<D> rest = hn::IfThenElse(go_left, pick.u_remapped, pick.u_remapped - p);
+    const Real<D> refilled = hn::MulAdd(refill.Next(d), Splat(d, 1.0 / (1 << 24)), rest);
+    const Real<D> remapped = hn::Min(SafeDiv(d, refilled, q), Splat(d, kLargestBelowOne));
+    pick.u_remapped = hn::IfThenElse(active, remapped, pick.u_remapped);
+    pick.probability = hn::IfThenElse(active, pick.probability * q, pick.probability);
+    node = hn::IfThenElse(ToIntMask(d, hn::And(active, go_left)), left,
+                          hn::IfThenElse(ToIntMask(d, active), right, node));
+  }
+  return pick;
+}
+
+/// Probability with which `PickLight` returns `light` (kNone allowed: 0), climbing from its leaf.
+template <class D>
+HWY_INLINE Real<D> PickProbability(D d, const LightView& view, Mask<D> active,
+                                   const Vec3<D>& position, const Vec3<D>& normal,
+                                   Int<D> light) {
+  const IntTag<D> di;
+  const Int<D> zero = hn::Zero(di), one = hn::Set(di, 1);
+  if (view.node_count == 0) return hn::Zero(d);
+  const Receiver<D> receiver = MakeReceiver(d, position, normal);
+  const auto lit = hn::And(ToIntMask(d, active), hn::Gt(light, hn::Set(di, kNone)));
+  Int<D> node = hn::IfThenElse(
+      lit, FieldInt(d, view.lights, hn::IfThenElseZero(lit, light), offsetof(Light, leaf)),
+      hn::Set(di, kNone));
+  active = ToMask(d, hn::Gt(node, hn::Set(di, kNone)));
+  Real<D> probability = hn::IfThenElseZero(active, Splat(d, 1));
+
+  for (;;) {
+    const Int<D> here = hn::Max(node, zero);
+    const Int<D> parent = FieldInt(d, view.nodes, here, offsetof(LightNode, parent));
+    active = hn::And(active, ToMask(d, hn::Gt(parent, hn::Set(di, kNone))));
+    if (hn::AllFalse(d, active)) return probability;
+    const Int<D> left = hn::IfThenElseZero(ToIntMask(d, active), hn::AndNot(one, here));
+    const Real<D> left_importance = Importance(d, view.nodes, left, receiver);
+    const Real<D> right_importance = Importance(d, view.nodes, left + one, receiver);
+    const Mask<D> dark = hn::Not(hn::Gt(left_importance + right_importance, hn::Zero(d)));
+    const Real<D> p = LeftProbability(d, left_importance, right_importance);
+    const Mask<D> is_left = ToMask(d, hn::Eq(here, left));
+    const Real<D> q = hn::IfThenZeroElse(dark, hn::IfThenElse(is_left, p, Splat(d, 1) - p));
+    probability = hn::IfThenElse(active, probability * q, probability);
+    node = hn::IfThenElse(ToIntMask(d, active), parent, node);
+    active = hn::And(active, hn::Gt(probability, hn::Zero(d)));
+  }
+}
+
+}  // namespace lights
+
+using lights::LightPick;
+using lights::PickLight;
+using lights::PickProbability;
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
