@@ -1,0 +1,220 @@
+// Baking and instancing of meshes, with transforms in double until the last rounding.
+#include "render/scene/placement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <unordered_map>
+
+#include "render/base/error.h"
+
+namespace carpool::render {
+namespace {
+
+using stages::kNone;
+using stages::Mesh;
+using stages::MeshInstance;
+using stages::Placement;
+using stages::SceneTables;
+using stages::Shape;
+using Matrix = std::array<double, 12>;
+
+// Copying this many triangles costs less than a second BVH level does.
+constexpr uint64_t kCopyTriangles = 200'000;
+constexpr size_t kMostElements = std::numeric_limits<int32_t>::max();
+
+double Determinant(const Matrix& m) {
+  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+         m[2] * (m[4] * m[9] - m[5] * m[8]);
+}
+
+// Cofactors times the sign of the determinant: takes normals along without dividing by anything.
+std::array<double, 9> NormalMatrix(const Matrix& m) {
+  const double sign = Determinant(m) < 0 ? -1 : 1;
+  const auto cofactor = [&](int r, int c) {
+    const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+    return sign * (m[4 * r1 + c1] * m[4 * r2 + c2] - m[4 * r1 + c2] * m[4 * r2 + c1]);
+  };
+  std::array<double, 9> n;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) n[3 * r + c] = cofactor(r, c);
+  }
+  return n;
+}
+
+// Fewer than two independent axes: all triangles have zero area.
+bool Vanishes(const Matrix& m) {
+  for (const double value : NormalMatrix(m)) {
+    if (value != 0) return false;
+  }
+  return true;
+}
+
+void TransformPoints(const float* in, float* out, int32_t count, const Matrix& m) {
+  for (int32_t v = 0; v < count; ++v, in += 3, out += 3) {
+    const double x = in[0], y = in[1], z = in[2];
+    for (int r = 0; r < 3; ++r) {
+      out[r] = static_cast<float>(m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3]);
+    }
+  }
+}
+
+// Directions through a 3x3 matrix, normalised; a vanishing one becomes zero, which readers replace by the triangle's.
+template <int kStride>
+void TransformDirections(const float* in, float* out, int32_t count, const std::array<double, 9>& m,
+                         double w_sign) {
+  for (int32_t v = 0; v < count; ++v, in += kStride, out += kStride) {
+    double d[3], length = 0;
+    for (int r = 0; r < 3; ++r) {
+      d[r] = m[3 * r] * in[0] + m[3 * r + 1] * in[1] + m[3 * r + 2] * in[2];
+      length += d[r] * d[r];
+    }
+    length = std::sqrt(length);
+    if constexpr (kStride == 4) out[3] = static_cast<float>(in[3] * w_sign);
+    for (int r = 0; r < 3; ++r) out[r] = length > 0 ? static_cast<float>(d[r] / length) : 0.0f;
+  }
+}
+
+class Placer {
+ public:
+  Placer(SceneTables& scene, const std::string& where) : g_(scene.geometry), where_(where) {
+    uses_.resize(g_.meshes.size());
+    for (const MeshInstance& instance : g_.instances) ++uses_[instance.mesh];
+    for (const Shape& shape : g_.shapes) {
+      ++float_users_[shape.positions];
+      if (shape.normals != kNone) ++float_users_[shape.normals];
+      if (shape.tangents != kNone) ++float_users_[shape.tangents];
+      ++index_users_[shape.first_index];
+    }
+  }
+
+  PlacementPlan Run() {
+    for (const MeshInstance& instance : g_.instances) {
+      if (Vanishes(instance.object_to_world)) continue;
+      const bool singular = Determinant(instance.object_to_world) == 0;  // Embree cannot invert it
+      if (uses_[instance.mesh] == 1 || singular || Copied(instance.mesh)) {
+        PlaceFlat(instance);
+      } else {
+        PlaceInstanced(instance);
+      }
+    }
+    Extend(g_.floats, 4);  // Embree loads 16 bytes at a vertex, also at the last one
+    return plan_;
+  }
+
+ private:
+  uint64_t Triangles(const Mesh& mesh) const {
+    uint64_t count = 0;
+    for (int32_t s = 0; s < mesh.shape_count; ++s) count += g_.shapes[mesh.first_shape + s].triangle_count;
+    return count;
+  }
+  // Streams may be overwritten with world-space values when nobody else reads them.
+  bool OwnsStreams(const Shape& shape) const {
+    const auto sole = [&](int32_t offset) { return offset == kNone || float_users_.at(offset) == 1; };
+    return sole(shape.positions) && sole(shape.normals) && sole(shape.tangents) &&
+           index_users_.at(shape.first_index) == 1;
+  }
+  bool Copied(int32_t mesh) const { return Triangles(g_.meshes[mesh]) * uses_[mesh] <= kCopyTriangles; }
+
+  Placement MakePlacement(const Shape& shape, int32_t object) const {
+    Placement p;
+    p.first_index = shape.first_index;
+    p.positions = shape.positions;
+    p.normals = shape.normals;
+    p.tangents = shape.tangents;
+    p.uvs = shape.uvs;
+    p.uv_sets = shape.uv_sets;
+    p.colors = shape.colors;
+    p.material = shape.material;
+    p.object = object;
+    return p;
+  }
+
+  // Room for `count` more elements in a stream; its offset.
+  template <class T>
+  int32_t Extend(std::vector<T>& stream, size_t count) {
+    const size_t offset = stream.size();
+    if (offset + count > kMostElements) {
+      throw InputError(where_, "the scene has more than 2^31 vertex values; split it or use fewer copies");
+    }
+    stream.resize(offset + count);
+    return static_cast<int32_t>(offset);
+  }
+
+  void PlaceFlat(const MeshInstance& instance) {
+    const Mesh mesh = g_.meshes[instance.mesh];
+    for (int32_t s = 0; s < mesh.shape_count; ++s) {
+      const int32_t index = mesh.first_shape + s;
+      const Shape shape = g_.shapes[index];
+      Placement p = MakePlacement(shape, instance.object);
+      Bake(shape, instance.object_to_world, uses_[instance.mesh] == 1 && OwnsStreams(shape), p);
+      plan_.flat.push_back({static_cast<int32_t>(g_.placements.size()), index});
+      plan_.flat_triangles += shape.triangle_count;
+      g_.placements.push_back(p);
+    }
+  }
+
+  void Bake(const Shape& shape, const Matrix& m, bool in_place, Placement& p) {
+    const int32_t n = shape.vertex_count;
+    const bool mirrored = Determinant(m) < 0;
+    if (!in_place) {
+      p.positions = Extend(g_.floats, size_t{3} * n);
+      if (shape.normals != kNone) p.normals = Extend(g_.floats, size_t{3} * n);
+      if (shape.tangents != kNone) p.tangents = Extend(g_.floats, size_t{4} * n);
+    }
+    float* const f = g_.floats.data();
+    const std::array<double, 9> linear = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]};
+    TransformPoints(f + shape.positions, f + p.positions, n, m);
+    if (shape.normals != kNone) {
+      TransformDirections<3>(f + shape.normals, f + p.normals, n, NormalMatrix(m), 1);
+    }
+    if (shape.tangents != kNone) {
+      TransformDirections<4>(f + shape.tangents, f + p.tangents, n, linear, mirrored ? -1 : 1);
+    }
+    if (mirrored) FlipWinding(shape, in_place, p);
+  }
+
+  void FlipWinding(const Shape& shape, bool in_place, Placement& p) {
+    const size_t count = size_t{3} * shape.triangle_count;
+    if (!in_place) {
+      p.first_index = Extend(g_.indices, count);
+      std::copy_n(g_.indices.begin() + shape.first_index, count, g_.indices.begin() + p.first_index);
+    }
+    for (size_t i = 0; i < count; i += 3) {
+      std::swap(g_.indices[p.first_index + i + 1], g_.indices[p.first_index + i + 2]);
+    }
+  }
+
+  void PlaceInstanced(const MeshInstance& instance) {
+    const Matrix& m = instance.object_to_world;
+    const Mesh& mesh = g_.meshes[instance.mesh];
+    plan_.instanced.push_back({instance.mesh, static_cast<int32_t>(g_.placements.size())});
+    const std::array<double, 9> normal = NormalMatrix(m);
+    double largest = 0;  // scaled, so that tiny and huge instances keep their normals in float range
+    for (const double value : normal) largest = std::max(largest, std::abs(value));
+    for (int32_t s = 0; s < mesh.shape_count; ++s) {
+      const Shape& shape = g_.shapes[mesh.first_shape + s];
+      Placement p = MakePlacement(shape, instance.object);
+      p.flags = stages::kPlacementInstanced | (Determinant(m) < 0 ? stages::kPlacementMirrored : 0);
+      for (int i = 0; i < 12; ++i) p.object_to_world[i] = static_cast<float>(m[i]);
+      for (int i = 0; i < 9; ++i) p.normal_to_world[i] = static_cast<float>(normal[i] / largest);
+      plan_.instanced_triangles += shape.triangle_count;
+      g_.placements.push_back(p);
+    }
+  }
+
+  stages::GeometryTables& g_;
+  const std::string& where_;
+  std::vector<uint32_t> uses_;  // instances per mesh
+  std::unordered_map<int32_t, int> float_users_, index_users_;  // shapes per stream offset
+  PlacementPlan plan_;
+};
+
+}  // namespace
+
+PlacementPlan PlaceInstances(SceneTables& scene, const std::string& where) {
+  return Placer(scene, where).Run();
+}
+
+}  // namespace carpool::render

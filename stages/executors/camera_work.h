@@ -1,0 +1,85 @@
+// Which camera packets a pass renders, in which order: tiles of 16x16 pixels, samples, groups of 4x2.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+
+namespace carpool::stages {
+
+constexpr uint32_t kGroupWidth = 4, kGroupHeight = 2;  // pixels of one coherent packet
+constexpr uint32_t kTileSize = 16;                     // pixels along a tile's side
+constexpr uint32_t kGroupsPerTile = kTileSize * kTileSize / 8;
+constexpr uint32_t kPhases = 8;  // interleaved subsets of groups, for previews
+
+/// Samples [first_sample, first_sample + sample_count) of the groups whose phase is in `phases` (bit p: phase p).
+struct CameraPass {
+  uint32_t first_sample = 0;
+  uint32_t sample_count = 1;
+  uint32_t phases = (1u << kPhases) - 1;
+};
+
+/// A fixed group of 4x2 pixels at one sample: what one packet traces. Groups on the border may reach outside the image.
+struct CameraPacket {
+  uint32_t x, y;  // of its first pixel
+  uint32_t sample;
+};
+
+/// The phase of the group whose first pixel is (x, y): a 2x4 pattern of groups, hence 8x8 pixels.
+inline uint32_t PhaseOf(uint32_t x, uint32_t y) {
+  // Bit-reversed row order, so that the first phases lie far apart.
+  constexpr uint32_t kOrder[8] = {0, 4, 6, 2, 3, 7, 5, 1};
+  return kOrder[(x / kGroupWidth % 2) * 4 + y / kGroupHeight % 4];
+}
+
+/// Hands out the packets of a pass, each once. Thread safe and lock free.
+class CameraWork {
+ public:
+  CameraWork(uint32_t width, uint32_t height, const CameraPass& pass)
+      : width_(width), height_(height), pass_(pass), tiles_x_((width + kTileSize - 1) / kTileSize) {
+    const uint64_t tiles_y = (height + kTileSize - 1) / kTileSize;
+    end_ = tiles_x_ * tiles_y * pass.sample_count * kGroupsPerTile;
+  }
+
+  /// Claims up to `count` places and calls `visit(packet)` for those inside the image and the phases.
+  /// False when nothing is left.
+  template <class Visit>
+  bool Claim(uint32_t count, Visit visit) {
+    const uint64_t first = next_.fetch_add(count, std::memory_order_relaxed);
+    const uint64_t last = std::min(first + count, end_);
+    for (uint64_t i = first; i < last; ++i) {
+      const CameraPacket packet = At(i);
+      if (packet.x < width_ && packet.y < height_ &&
+          ((pass_.phases >> PhaseOf(packet.x, packet.y)) & 1u) != 0) {
+        visit(packet);
+      }
+    }
+    return last < end_ && first < end_;
+  }
+
+  /// Places handed out so far over all places, 0..1.
+  double Fraction() const {
+    const uint64_t done = std::min(next_.load(std::memory_order_relaxed), end_);
+    return end_ == 0 ? 1.0 : static_cast<double>(done) / static_cast<double>(end_);
+  }
+
+ private:
+  CameraPacket At(uint64_t place) const {
+    const uint32_t group = static_cast<uint32_t>(place % kGroupsPerTile);
+    place /= kGroupsPerTile;
+    const uint32_t sample = static_cast<uint32_t>(place % pass_.sample_count);
+    const uint64_t tile = place / pass_.sample_count;
+    constexpr uint32_t kAcross = kTileSize / kGroupWidth;
+    return {static_cast<uint32_t>(tile % tiles_x_) * kTileSize + group % kAcross * kGroupWidth,
+            static_cast<uint32_t>(tile / tiles_x_) * kTileSize + group / kAcross * kGroupHeight,
+            pass_.first_sample + sample};
+  }
+
+  uint32_t width_, height_;
+  CameraPass pass_;
+  uint64_t tiles_x_;
+  uint64_t end_;
+  std::atomic<uint64_t> next_{0};
+};
+
+}  // namespace carpool::stages

@@ -1,0 +1,67 @@
+// What drives the kernels: the executors' common face.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include <tbb/task_arena.h>
+
+#include "carpool/carpool.h"
+#include "stages/executors/camera_work.h"
+#include "stages/kernels/kernels.h"
+
+namespace carpool::stages {
+
+struct RayCounts {
+  uint64_t camera = 0, bounce = 0, shadow = 0;  // bounce counts continued rays through transparent layers too
+  uint64_t total() const { return camera + bounce + shadow; }
+  RayCounts& operator+=(const RayCounts& other) {
+    camera += other.camera;
+    bounce += other.bounce;
+    shadow += other.shadow;
+    return *this;
+  }
+};
+
+struct ExecutorOptions {
+  tbb::task_arena* arena = nullptr;  // required; supplies the threads
+  uint32_t threads = 1;
+  uint64_t memory_bytes = uint64_t{64} << 20;  // for path state and queues (wavefront)
+  uint32_t batch_items = 0;                    // 0: each stage's own
+  Policy policy = Policy::deepest_first();
+};
+
+/// What one pass did.
+struct PassReport {
+  RayCounts rays;
+  double seconds = 0;
+  bool stopped = false;     // ended early: samples of some pixels of this pass are missing
+  RunReport schedule;       // of the stage graph; empty for executors without one
+  uint64_t state_bytes = 0; // path state
+};
+
+/// Renders passes into the film of its context. The samples a pass adds, and their values, do not depend on
+/// executor, threads, batches or policy.
+class Executor {
+ public:
+  virtual ~Executor() = default;
+  virtual std::string_view name() const = 0;
+
+  /// Renders one pass. `stop` ends it early: no new camera rays, what is in flight comes to its end.
+  /// `progress`, if set, is called now and then by some worker with the fraction done.
+  virtual PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
+                            const std::function<void(double)>& progress) = 0;
+};
+
+/// Both borrow `context` and `kernels`, which must outlive the executor.
+std::unique_ptr<Executor> MakeWavefront(const KernelContext& context, const Kernels& kernels,
+                                        std::span<const Placement> placements,
+                                        const ExecutorOptions& options);
+std::unique_ptr<Executor> MakeMegakernel(const KernelContext& context, const Kernels& kernels,
+                                         const ExecutorOptions& options);
+
+}  // namespace carpool::stages

@@ -1,0 +1,117 @@
+// The megakernel executor: one loop per path over tiles in parallel, from the same kernels at one lane.
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <chrono>
+
+#include "stages/executors/executor.h"
+#include "stages/simd/denormals.h"
+
+namespace carpool::stages {
+namespace {
+
+class Megakernel final : public Executor {
+ public:
+  Megakernel(const KernelContext& context, const Kernels& kernels, const ExecutorOptions& options)
+      : c_(context), kernels_(kernels.one), opacity_{&context, kernels.opacity}, options_(options) {
+    // Camera rays come in packets anyway, so they may be made at full width.
+    camera_ = kernels.wide.camera;
+  }
+
+  std::string_view name() const override { return "megakernel"; }
+  PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
+                    const std::function<void(double)>& progress) override;
+
+ private:
+  void RenderPacket(const CameraPacket& packet, RayCounts& rays) const;
+  void FollowPath(PathState* paths, uint32_t slot, RayCounts& rays) const;
+
+  const KernelContext& c_;
+  KernelSet kernels_;
+  void (*camera_)(const KernelContext&, PathState*, std::span<const uint32_t>);
+  OpacityQuery opacity_;
+  ExecutorOptions options_;
+};
+
+void Megakernel::FollowPath(PathState* paths, uint32_t slot, RayCounts& rays) const {
+  PathState& path = paths[slot];
+  const std::span<const uint32_t> slots(&slot, 1);
+  for (;;) {
+    if (path.placement < 0) {
+      kernels_.miss(c_, paths, slots);
+      break;
+    }
+    Next next = Next::film;
+    kernels_.shade(c_, paths, slots, &next);
+    if (next == Next::shadow) {
+      TraceShadow(c_.trace, opacity_, path);
+      ++rays.shadow;
+      next = (path.flags & kPathAlive) != 0 ? Next::trace : Next::film;
+    }
+    if (next == Next::film) break;
+    IntersectPath(c_.trace, path);
+    ++rays.bounce;
+  }
+  c_.film->Add(path.pixel, path.sample, path.radiance);
+}
+
+void Megakernel::RenderPacket(const CameraPacket& packet, RayCounts& rays) const {
+  std::array<PathState, 8> paths;
+  std::array<PathState*, 8> group = {};
+  std::array<uint32_t, 8> slots;
+  size_t count = 0;
+  for (uint32_t i = 0; i < 8; ++i) {
+    const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
+    if (x >= c_.width || y >= c_.height) continue;
+    paths[i].pixel = y * c_.width + x;
+    paths[i].sample = packet.sample;
+    group[i] = &paths[i];
+    slots[count++] = i;
+  }
+  camera_(c_, paths.data(), {slots.data(), count});
+  IntersectPacket(c_.trace, group.data());
+  rays.camera += count;
+  for (size_t i = 0; i < count; ++i) FollowPath(paths.data(), slots[i], rays);
+}
+
+PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& stop,
+                              const std::function<void(double)>& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  CameraWork work(c_.width, c_.height, pass);
+  tbb::enumerable_thread_specific<RayCounts> tallies;
+  std::atomic<bool> reporting{false};
+
+  // Each body keeps claiming the groups of one tile at one sample until none is left: dynamic balance, no
+  // barrier.
+  const auto worker = [&](size_t) {
+    const FlushDenormals denormals;
+    RayCounts& rays = tallies.local();
+    bool more = true;
+    while (more && !stop.load(std::memory_order_relaxed)) {
+      more = work.Claim(kGroupsPerTile, [&](const CameraPacket& p) { RenderPacket(p, rays); });
+      if (progress && !reporting.exchange(true, std::memory_order_acquire)) {
+        progress(work.Fraction());
+        reporting.store(false, std::memory_order_release);
+      }
+    }
+  };
+  options_.arena->execute([&] { tbb::parallel_for(size_t{0}, size_t{options_.threads}, worker); });
+
+  PassReport report;
+  for (const RayCounts& rays : tallies) report.rays += rays;
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.stopped = work.Fraction() < 1;
+  report.state_bytes = uint64_t{options_.threads} * 8 * sizeof(PathState);
+  return report;
+}
+
+}  // namespace
+
+std::unique_ptr<Executor> MakeMegakernel(const KernelContext& context, const Kernels& kernels,
+                                         const ExecutorOptions& options) {
+  return std::make_unique<Megakernel>(context, kernels, options);
+}
+
+}  // namespace carpool::stages

@@ -1,0 +1,265 @@
+// The wavefront executor: the path tracer as a graph of stages, with queues binned by material and depth.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <vector>
+
+#include "stages/executors/binning.h"
+#include "stages/executors/executor.h"
+#include "stages/executors/slot_pool.h"
+#include "stages/simd/denormals.h"
+
+namespace carpool::stages {
+namespace {
+
+using Slot = uint32_t;
+constexpr uint32_t kMaxBatch = 65536;
+
+struct alignas(64) WorkerTally {
+  RayCounts rays;
+  std::vector<Slot> slots;  // scratch of one batch
+  std::vector<Next> next;
+};
+
+uint32_t BlockItems(const ExecutorOptions& options, uint32_t preferred) {
+  return options.batch_items != 0 ? std::min(options.batch_items, kMaxBatch) : preferred;
+}
+
+/// Paths in flight: enough to fill the bins, few enough for the cache and the memory asked for. A quarter of the
+/// budget is left to the queues.
+uint32_t PathsInFlight(const ExecutorOptions& options) {
+  const uint64_t fitting = options.memory_bytes / 4 * 3 / sizeof(PathState);
+  return static_cast<uint32_t>(std::clamp<uint64_t>(fitting, 1024, 65536));
+}
+
+std::vector<int32_t> Materials(std::span<const Placement> placements) {
+  std::vector<int32_t> materials;
+  for (const Placement& placement : placements) materials.push_back(placement.material);
+  return materials;
+}
+
+uint32_t MaterialCount(const std::vector<int32_t>& materials) {
+  return materials.empty() ? 1 : static_cast<uint32_t>(*std::max_element(materials.begin(), materials.end())) + 1;
+}
+
+class Wavefront final : public Executor {
+ public:
+  Wavefront(const KernelContext& context, const Kernels& kernels,
+            std::span<const Placement> placements, const ExecutorOptions& options)
+      : c_(context),
+        kernels_(kernels.wide),
+        opacity_{&context, kernels.opacity},
+        material_of_placement_(Materials(placements)),
+        options_(options),
+        in_flight_(PathsInFlight(options)),
+        bins_(MaterialCount(material_of_placement_), context.max_depth, in_flight_, BlockItems(options, 256)),
+        pool_(in_flight_, options.threads),
+        paths_(pool_.capacity()),
+        tallies_(options.threads) {
+    BuildGraph();
+  }
+
+  std::string_view name() const override { return "wavefront"; }
+  PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
+                    const std::function<void(double)>& progress) override;
+
+ private:
+  void BuildGraph();
+  void CameraKernel(const Batch<CameraPacket>& batch, Emitter& out);
+  void IntersectKernel(const Batch<Slot>& batch, Emitter& out);
+  void ShadeKernel(const Batch<Slot>& batch, Emitter& out);
+  void ShadowKernel(const Batch<Slot>& batch, Emitter& out);
+  void MissKernel(const Batch<Slot>& batch, Emitter& out);
+  void FilmKernel(const Batch<Slot>& batch);
+
+  void EmitHit(Slot slot, Emitter& out) {
+    const PathState& path = paths_[slot];
+    if (path.placement >= 0) {
+      out.emit(shade_, bins_.Of(material_of_placement_[path.placement], path.flags), slot);
+    } else if (has_environment_) {
+      out.emit(miss_, 0, slot);
+    } else {
+      out.emit(film_, 0, slot);
+    }
+  }
+  SourceStatus ClaimPackets(SourceContext& source, Emitter& out);
+
+  const KernelContext& c_;
+  KernelSet kernels_;
+  OpacityQuery opacity_;
+  std::vector<int32_t> material_of_placement_;  // 4 bytes a placement instead of its whole record
+  ExecutorOptions options_;
+  uint32_t in_flight_;
+  ShadeBins bins_;
+  SlotPool pool_;
+  std::vector<PathState> paths_;
+  std::vector<WorkerTally> tallies_;
+  bool has_environment_ = false;
+
+  Graph graph_;
+  StageHandle<CameraPacket> camera_;
+  StageHandle<Slot> intersect_, shade_, shadow_, miss_, film_;
+
+  // Of the pass under way.
+  CameraWork* work_ = nullptr;
+  const std::atomic<bool>* stop_ = nullptr;
+};
+
+/// The lecture's loop as a graph: camera rays are traced, hits shaded, shadow rays traced, and what goes on
+/// is traced again, until the film has it.
+void Wavefront::BuildGraph() {
+  has_environment_ = c_.lights.environment.width > 0;
+  const uint32_t lanes = static_cast<uint32_t>(kernels_.lanes);
+  const auto stage = [&](const char* name, uint32_t bins, uint32_t stage_lanes, int rank) {
+    return graph_.add_stage<Slot>({.name = name, .bins = bins, .block_items = BlockItems(options_, 256),
+                                   .lanes = stage_lanes, .rank = rank, .weight = 1});
+  };
+  camera_ = graph_.add_stage<CameraPacket>({.name = "camera", .block_items = 32, .rank = 0, .weight = 8});
+  intersect_ = stage("intersect", 1, 1, 1);
+  shade_ = stage("shade", bins_.count(), lanes, 2);
+  shadow_ = stage("shadow", 1, 1, 3);
+  film_ = stage("film", 1, 1, 5);
+  if (has_environment_) miss_ = stage("environment", 1, lanes, 4);
+
+  const SourceHandle pixels = graph_.add_source(
+      {.name = "pixels", .fan_out = 8, .concurrency = 0, .burst = 32},
+      [this](SourceContext& source, Emitter& out) { return ClaimPackets(source, out); });
+  graph_.set_kernel(camera_, [this](const Batch<CameraPacket>& b, Emitter& out) { CameraKernel(b, out); });
+  graph_.set_kernel(intersect_, [this](const Batch<Slot>& b, Emitter& out) { IntersectKernel(b, out); });
+  graph_.set_kernel(shade_, [this](const Batch<Slot>& b, Emitter& out) { ShadeKernel(b, out); });
+  graph_.set_kernel(shadow_, [this](const Batch<Slot>& b, Emitter& out) { ShadowKernel(b, out); });
+  graph_.set_kernel(film_, [this](const Batch<Slot>& b, Emitter&) { FilmKernel(b); });
+
+  graph_.add_edge(pixels, camera_);
+  for (const StageHandle<Slot>& after_trace : {shade_, film_}) {
+    graph_.add_edge(camera_, after_trace);
+    graph_.add_edge(intersect_, after_trace);
+  }
+  for (const StageHandle<Slot>& after_shade : {shadow_, intersect_, film_}) graph_.add_edge(shade_, after_shade);
+  for (const StageHandle<Slot>& after_shadow : {intersect_, film_}) graph_.add_edge(shadow_, after_shadow);
+  if (has_environment_) {
+    graph_.set_kernel(miss_, [this](const Batch<Slot>& b, Emitter& out) { MissKernel(b, out); });
+    graph_.add_edge(camera_, miss_);
+    graph_.add_edge(intersect_, miss_);
+    graph_.add_edge(miss_, film_);
+  }
+}
+
+SourceStatus Wavefront::ClaimPackets(SourceContext& source, Emitter& out) {
+  if (stop_->load(std::memory_order_relaxed)) return SourceStatus::exhausted;
+  const bool more = work_->Claim(source.budget, [&](const CameraPacket& p) { out.emit(camera_, 0, p); });
+  return more ? SourceStatus::more : SourceStatus::exhausted;
+}
+
+void Wavefront::CameraKernel(const Batch<CameraPacket>& batch, Emitter& out) {
+  const FlushDenormals denormals;
+  WorkerTally& tally = tallies_[batch.worker];
+  std::vector<Slot>& slots = tally.slots;
+  slots.clear();
+  for (const CameraPacket& packet : batch.items) {
+    for (uint32_t i = 0; i < 8; ++i) {
+      const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
+      if (x >= c_.width || y >= c_.height) continue;
+      const Slot slot = pool_.Take(batch.worker);
+      paths_[slot].pixel = y * c_.width + x;
+      paths_[slot].sample = packet.sample;
+      slots.push_back(slot);
+    }
+  }
+  kernels_.camera(c_, paths_.data(), slots);
+  size_t first = 0;
+  for (const CameraPacket& packet : batch.items) {
+    std::array<PathState*, 8> group = {};
+    size_t end = first;
+    for (uint32_t i = 0; i < 8; ++i) {
+      const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
+      if (x < c_.width && y < c_.height) group[i] = &paths_[slots[end++]];
+    }
+    IntersectPacket(c_.trace, group.data());
+    for (; first < end; ++first) EmitHit(slots[first], out);
+  }
+  tally.rays.camera += slots.size();
+}
+
+void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {
+  const FlushDenormals denormals;
+  for (size_t i = 0; i < batch.items.size(); ++i) {
+    if (i + 4 < batch.items.size()) __builtin_prefetch(&paths_[batch.items[i + 4]]);
+    IntersectPath(c_.trace, paths_[batch.items[i]]);
+    EmitHit(batch.items[i], out);
+  }
+  tallies_[batch.worker].rays.bounce += batch.items.size();
+}
+
+void Wavefront::ShadeKernel(const Batch<Slot>& batch, Emitter& out) {
+  const FlushDenormals denormals;
+  std::vector<Next>& next = tallies_[batch.worker].next;
+  next.resize(batch.items.size());
+  kernels_.shade(c_, paths_.data(), batch.items, next.data());
+  for (size_t i = 0; i < batch.items.size(); ++i) {
+    const StageHandle<Slot>& to =
+        next[i] == Next::shadow ? shadow_ : next[i] == Next::trace ? intersect_ : film_;
+    out.emit(to, 0, batch.items[i]);
+  }
+}
+
+void Wavefront::ShadowKernel(const Batch<Slot>& batch, Emitter& out) {
+  const FlushDenormals denormals;
+  for (size_t i = 0; i < batch.items.size(); ++i) {
+    if (i + 4 < batch.items.size()) __builtin_prefetch(&paths_[batch.items[i + 4]]);
+    PathState& path = paths_[batch.items[i]];
+    TraceShadow(c_.trace, opacity_, path);
+    out.emit((path.flags & kPathAlive) != 0 ? intersect_ : film_, 0, batch.items[i]);
+  }
+  tallies_[batch.worker].rays.shadow += batch.items.size();
+}
+
+void Wavefront::MissKernel(const Batch<Slot>& batch, Emitter& out) {
+  const FlushDenormals denormals;
+  kernels_.miss(c_, paths_.data(), batch.items);
+  out.emit(film_, 0, batch.items);
+}
+
+void Wavefront::FilmKernel(const Batch<Slot>& batch) {
+  const FlushDenormals denormals;
+  for (const Slot slot : batch.items) {
+    const PathState& path = paths_[slot];
+    c_.film->Add(path.pixel, path.sample, path.radiance);
+  }
+  pool_.Give(batch.worker, batch.items);
+}
+
+PassReport Wavefront::Render(const CameraPass& pass, const std::atomic<bool>& stop,
+                             const std::function<void(double)>& progress) {
+  CameraWork work(c_.width, c_.height, pass);
+  work_ = &work;
+  stop_ = &stop;
+  for (WorkerTally& tally : tallies_) tally.rays = {};
+
+  RunOptions run_options;
+  run_options.threads = options_.threads;
+  run_options.arena = options_.arena;
+  run_options.in_flight = in_flight_;
+  run_options.policy = options_.policy;
+  if (progress) run_options.progress = [&](const Progress&) { progress(work.Fraction()); };
+  PassReport report;
+  report.schedule = run(graph_, run_options);
+  if (const std::string note = bins_.Note(); !note.empty()) report.schedule.notes.push_back(note);
+
+  for (const WorkerTally& tally : tallies_) report.rays += tally.rays;
+  report.seconds = report.schedule.seconds;
+  report.stopped = work.Fraction() < 1;
+  report.state_bytes = paths_.size() * sizeof(PathState);
+  work_ = nullptr;
+  return report;
+}
+
+}  // namespace
+
+std::unique_ptr<Executor> MakeWavefront(const KernelContext& context, const Kernels& kernels,
+                                        std::span<const Placement> placements,
+                                        const ExecutorOptions& options) {
+  return std::make_unique<Wavefront>(context, kernels, placements, options);
+}
+
+}  // namespace carpool::stages
