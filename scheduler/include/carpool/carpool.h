@@ -1,0 +1,12 @@
+// Everything in one include: the graph, its run, and the report.
+#pragma once
+
+#include "carpool/batch.h"
+#include "carpool/cancel.h"
+#include "carpool/emitter.h"
+#include "carpool/errors.h"
+#include "carpool/graph.h"
+#include "carpool/policy.h"
+#include "carpool/report.h"
+#include "carpool/run.h"
+#include "carpool/version.h"

@@ -1,0 +1,91 @@
+// Running a graph: the options of a run, and run() itself.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include <tbb/task_arena.h>
+
+#include "carpool/cancel.h"
+#include "carpool/graph.h"
+#include "carpool/policy.h"
+#include "carpool/report.h"
+
+namespace carpool {
+
+/// RunMode says what executes the graph. The kernels cannot tell the difference.
+enum class RunMode {
+  threads,  ///< The workers of a oneTBB arena, the calling thread among them.
+  serial,   ///< The calling thread alone, in an order that depends on nothing but the graph and the
+            ///< options.
+};
+
+/// Overflow says what happens when a kernel makes more live items than were declared.
+enum class Overflow {
+  fail,  ///< The emit throws OverflowError, which ends the run.
+  grow,  ///< The run takes more memory than worst_case_bytes() and says so in its report.
+};
+
+/// FlushOptions says when a block leaves before it is full.
+struct FlushOptions {
+  std::uint32_t count = 0;  ///< As soon as it has this many items. Zero: the stage's block_items.
+  std::chrono::nanoseconds linger{0};  ///< When it is older than this. Zero: at any age.
+  bool idle = true;                    ///< When another worker is without work and asks for it.
+};
+
+/// Progress is a glance at a run that is under way. The numbers are exact per worker, but not of
+/// one instant.
+struct Progress {
+  double seconds = 0;             ///< Since the run began.
+  std::uint64_t batches = 0;      ///< Kernel calls so far.
+  std::uint64_t item_visits = 0;  ///< Items handled so far, counted once per stage they visited.
+};
+
+/// RunOptions are the settings of one run. All have defaults: run(graph) is a good start.
+struct RunOptions {
+  /// Workers. Zero: as many as the arena offers.
+  std::uint32_t threads = 0;
+
+  /// The arena that supplies the threads; it must outlive the call. Null: the caller's current one,
+  /// or, if `threads` is given, one made for this run.
+  tbb::task_arena* arena = nullptr;
+
+  /// Credits: the most live items. Sources wait when they are used up; nothing else ever waits.
+  std::uint64_t in_flight = 131072;
+
+  Policy policy = Policy::deepest_first();
+  FlushOptions flush = {};
+  RunMode mode = RunMode::threads;
+  Overflow overflow = Overflow::fail;
+
+  /// Ends the run early on request. The default token never asks.
+  CancelToken cancel = CancelToken(nullptr);
+
+  /// Ends the run when this moment has come; bounded by one batch per worker.
+  std::optional<std::chrono::steady_clock::time_point> deadline = std::nullopt;
+
+  /// Called by one worker at a time, between batches, about every `progress_every`. Keep it short.
+  /// Exceptions end the run.
+  std::function<void(const Progress&)> progress = {};
+  std::chrono::milliseconds progress_every{200};
+};
+
+/// run executes the graph until its sources are exhausted and every item has retired.
+///
+/// Returns after every worker has left, so that what kernels wrote is visible to the caller. The
+/// first exception that a kernel, source or callback throws is rethrown here. Cancel and deadline
+/// end the run without an exception; see RunReport::outcome. Thread safety: may be called from
+/// several threads at once, also with one arena, and from inside a kernel. Errors:
+/// std::invalid_argument for a graph or options that make no sense; OverflowError; whatever kernels
+/// throw.
+RunReport run(const Graph& graph, const RunOptions& options = {});
+
+/// worst_case_bytes returns how much memory the blocks and tables of such a run can need. A run
+/// stays below it whatever its kernels do, within the fan-out they declared. README.md derives the
+/// formula.
+std::size_t worst_case_bytes(const Graph& graph, const RunOptions& options = {});
+
+}  // namespace carpool

@@ -1,0 +1,214 @@
+// Works out the sizes of a run, and the bound on its memory.
+#include "layout.h"
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "open_table.h"
+#include "ready_queue.h"
+#include "stats.h"
+
+namespace carpool {
+namespace {
+
+constexpr std::uint32_t kLine = 64;
+constexpr std::uint64_t kMaxBlockBytes = 64ULL << 20;
+constexpr std::uint64_t kMaxCredits =
+    1ULL << 31;  // so that one call's tally cannot overflow its 32 bits
+
+std::uint64_t round_up_to_line(std::uint64_t bytes) {
+  return (bytes + kLine - 1) / kLine * kLine;
+}
+
+// A ladder of sizes: one cache line, times four, ..., the full block. The last step may be up to
+// eight-fold, which spares a size that hardly differs from the full one.
+std::vector<std::uint32_t> ladder(std::uint32_t item_bytes, std::uint32_t block_items) {
+  const std::uint64_t full = round_up_to_line(std::uint64_t{item_bytes} * block_items);
+  std::vector<std::uint32_t> sizes;
+  for (std::uint64_t bytes = round_up_to_line(item_bytes); bytes * 2 <= full; bytes *= 4) {
+    sizes.push_back(static_cast<std::uint32_t>(bytes));
+  }
+  sizes.push_back(static_cast<std::uint32_t>(full));
+  return sizes;
+}
+
+}  // namespace
+
+Layout::Layout(const Graph& graph, const RunOptions& options, std::uint32_t worker_count)
+    : workers(worker_count), slots(graph.slots()), in_flight(options.in_flight) {
+  if (in_flight == 0 || in_flight > kMaxCredits) {
+    throw std::invalid_argument("carpool: RunOptions::in_flight must be between 1 and 2^31");
+  }
+  stages.resize(graph.stages().size());
+  track_age =
+      options.flush.linger.count() > 0 || options.policy.kind() == Policy::Kind::oldest_first;
+  set_weights(graph);
+  order_by_rank(graph);
+  switch (options.policy.kind()) {
+    case Policy::Kind::deepest_first:
+      break;  // order_by_rank has set it
+    case Policy::Kind::fullest_first:
+    case Policy::Kind::oldest_first:
+    case Policy::Kind::custom:
+      lanes = options.policy.lanes();
+      break;
+  }
+  build_levels(graph, options);
+  limit_classes();
+}
+
+void Layout::set_weights(const Graph& graph) {
+  std::uint32_t fan_out = 1;
+  for (const auto& source : graph.sources()) {
+    fan_out = std::max(fan_out, source.options.fan_out);
+  }
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const std::uint32_t declared = graph.stages()[i].options.weight;
+    stages[i].weight = declared != 0 ? declared : fan_out;
+    tally_of.push_back(std::uint64_t{stages[i].weight} << 32 | 1);
+  }
+  for (const auto& source : graph.sources()) {
+    std::uint64_t charge = source.options.fan_out;
+    for (std::uint32_t i = 0; i < stages.size(); ++i) {
+      const auto& to = source.successors;
+      if (to.empty() || std::find(to.begin(), to.end(), i) != to.end()) {
+        charge = std::max<std::uint64_t>(charge, stages[i].weight);
+      }
+    }
+    if (charge > in_flight) {
+      throw std::invalid_argument(
+          "carpool: source '" + source.options.name + "' needs " + std::to_string(charge) +
+          " credits for one item, but RunOptions::in_flight is " + std::to_string(in_flight));
+    }
+    source_charge.push_back(charge);
+  }
+}
+
+void Layout::order_by_rank(const Graph& graph) {
+  std::vector<std::uint32_t> order(stages.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto rank_of = [&](std::uint32_t stage) { return graph.stages()[stage].options.rank; };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return rank_of(a) > rank_of(b); });
+  std::uint32_t lane = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    StageLayout& stage = stages[order[i]];
+    if (i > 0 && rank_of(order[i]) != rank_of(order[i - 1])) {
+      ++lane;
+    }
+    stage.rank_lane = lane;
+    stage.first_bit = static_cast<std::uint32_t>(stage_of_bit.size());
+    stage_of_bit.insert(stage_of_bit.end(), graph.stages()[order[i]].options.bins, order[i]);
+  }
+  lanes = lane + 1;
+}
+
+void Layout::build_levels(const Graph& graph, const RunOptions& options) {
+  std::vector<std::vector<std::uint32_t>> ladders;
+  std::vector<std::uint32_t> sizes{kLine};  // ReadyBlocks come from the pool, too
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const Graph::Stage& from = graph.stages()[i];
+    StageLayout& stage = stages[i];
+    stage.item_bytes = static_cast<std::uint32_t>(from.item_bytes);
+    stage.first_slot = from.first_slot;
+    stage.bins = from.options.bins;
+    stage.lanes = from.options.lanes;
+    stage.rank = from.options.rank;
+    stage.block_items = from.options.block_items;
+    if (options.flush.count != 0 && options.flush.count < stage.block_items) {
+      stage.block_items = options.flush.count;
+      stage.full_cause = FlushCause::count;
+    }
+    if (std::uint64_t{stage.item_bytes} * stage.block_items > kMaxBlockBytes) {
+      throw std::invalid_argument("carpool: a block of stage '" + from.options.name +
+                                  "' is larger than 64 MiB; lower its block_items");
+    }
+    ladders.push_back(ladder(stage.item_bytes, stage.block_items));
+    sizes.insert(sizes.end(), ladders.back().begin(), ladders.back().end());
+  }
+  std::sort(sizes.begin(), sizes.end());
+  sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
+  for (const std::uint32_t bytes : sizes) {
+    classes.push_back({.bytes = bytes, .cache = std::clamp(16384U / bytes, 2U, 64U), .limit = 0});
+  }
+  node_class = class_of(kLine);
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    StageLayout& stage = stages[i];
+    stage.top_level = static_cast<std::uint8_t>(ladders[i].size() - 1);
+    // Small steps save memory where bins are many. Where one block of a size for every bin and
+    // worker costs no more than a quarter of what the items in flight do, beginning at that size
+    // saves copies.
+    const std::uint64_t thrift = std::max<std::uint64_t>(65536, in_flight * stage.item_bytes / 4);
+    for (std::uint8_t level = 0; level <= stage.top_level; ++level) {
+      const std::uint32_t bytes = ladders[i][level];
+      stage.levels[level] = {.pool_class = class_of(bytes),
+                             .bytes = bytes,
+                             .items = std::min(bytes / stage.item_bytes, stage.block_items)};
+      if (std::uint64_t{bytes} * stage.bins * workers <= thrift) {
+        stage.start_level = level;
+      }
+    }
+  }
+}
+
+std::uint32_t Layout::class_of(std::uint32_t bytes) const {
+  const auto at = std::lower_bound(classes.begin(), classes.end(), bytes,
+                                   [](const PoolClass& c, std::uint32_t b) { return c.bytes < b; });
+  return static_cast<std::uint32_t>(at - classes.begin());
+}
+
+// The derivation is in README.md, section "Memory".
+void Layout::limit_classes() {
+  const std::uint64_t partials = std::uint64_t{workers} * kPartialsPerWorker;
+  std::uint64_t shortest = kMaxCredits;
+  for (const StageLayout& stage : stages) {
+    shortest = std::min<std::uint64_t>(shortest, stage.block_items);
+  }
+  for (std::uint32_t c = 0; c < classes.size(); ++c) {
+    std::uint64_t bins = 0;              // bins whose open block can be of this size
+    std::uint64_t fewest = kMaxCredits;  // items that a block of this size holds at least
+    std::uint64_t full = 0;              // full blocks of this size
+    bool used = false;
+    for (const StageLayout& stage : stages) {
+      for (std::uint8_t level = stage.start_level; level <= stage.top_level; ++level) {
+        if (stage.levels[level].pool_class != c) {
+          continue;
+        }
+        used = true;
+        bins += stage.bins;
+        fewest = std::min<std::uint64_t>(
+            fewest, level == stage.start_level ? 1 : stage.levels[level - 1].items + 1);
+        if (level == stage.top_level) {
+          full = std::max(full, in_flight / stage.block_items);
+        }
+      }
+    }
+    if (used) {
+      const std::uint64_t open = std::min(bins * workers + partials, in_flight / fewest);
+      // Each worker may be running one block, and be copying into another.
+      classes[c].limit = open + full + std::uint64_t{workers} * (2 + classes[c].cache);
+    }
+    if (c == node_class) {
+      classes[c].limit +=
+          partials + in_flight / shortest + std::uint64_t{workers} * (2 + classes[c].cache);
+    }
+  }
+}
+
+std::size_t Layout::table_bytes() const {
+  const std::size_t per_worker = OpenTable::bytes_for(*this) + ReadyQueue::bytes_for(lanes) +
+                                 WorkerStats::bytes_for(stages.size(), source_charge.size(), slots);
+  return per_worker * workers;
+}
+
+std::size_t Layout::block_bytes() const {
+  std::size_t sum = 0;
+  for (const PoolClass& c : classes) {
+    sum += static_cast<std::size_t>(c.limit) * c.bytes;
+  }
+  return sum;
+}
+
+}  // namespace carpool

@@ -1,0 +1,75 @@
+// What a run works out once, before it begins: sizes of blocks, order of bins, credits, memory
+// limits.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "carpool/run.h"
+
+namespace carpool {
+
+inline constexpr std::uint32_t kMaxLevels = 16;
+inline constexpr std::uint32_t kGrades = 3;  // see OpenTable
+inline constexpr std::uint32_t kPartialsPerWorker =
+    16;  // published partial blocks a worker may have out
+
+// BlockLevel is one size of block in a stage's ladder of sizes.
+struct BlockLevel {
+  std::uint32_t pool_class = 0;
+  std::uint32_t bytes = 0;
+  std::uint32_t items = 0;
+};
+
+struct StageLayout {
+  std::uint32_t item_bytes = 0;
+  std::uint32_t first_slot = 0;
+  std::uint32_t bins = 0;
+  std::uint32_t block_items = 0;  // after FlushOptions::count
+  std::uint32_t lanes = 1;
+  std::uint32_t weight = 1;     // credits an item holds
+  std::uint32_t first_bit = 0;  // position of bin 0 in bitmaps, which are in order of rank
+  std::uint32_t rank_lane = 0;  // 0 for the highest rank
+  int rank = 0;
+  FlushCause full_cause = FlushCause::full;
+  std::uint8_t start_level = 0;
+  std::uint8_t top_level = 0;
+  std::array<BlockLevel, kMaxLevels> levels{};
+};
+
+// PoolClass is one size of block in the pool.
+struct PoolClass {
+  std::uint32_t bytes = 0;
+  std::uint32_t cache = 0;  // how many free ones a worker may keep
+  std::uint64_t limit = 0;  // how many there may be
+};
+
+struct Layout {
+  Layout(const Graph& graph, const RunOptions& options, std::uint32_t workers);
+
+  std::size_t block_bytes() const;  // the pool's part of the bound
+  std::size_t table_bytes() const;  // the fixed tables
+
+  std::uint32_t workers;
+  std::uint32_t slots;
+  std::uint64_t in_flight;
+  std::uint32_t lanes = 1;       // of the policy
+  bool track_age = false;        // are open blocks linked by age?
+  std::uint32_t node_class = 0;  // the pool class that ReadyBlocks come from
+  std::vector<StageLayout> stages;
+  std::vector<PoolClass> classes;            // ascending in size
+  std::vector<std::uint64_t> tally_of;       // by stage; see Emitter
+  std::vector<std::uint64_t> source_charge;  // credits per item that a source emits
+  std::vector<std::uint32_t> stage_of_bit;
+
+ private:
+  void set_weights(const Graph& graph);
+  void order_by_rank(const Graph& graph);
+  void build_levels(const Graph& graph, const RunOptions& options);
+  void limit_classes();
+  std::uint32_t class_of(std::uint32_t bytes) const;
+};
+
+}  // namespace carpool

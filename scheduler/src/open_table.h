@@ -1,0 +1,97 @@
+// One worker's open blocks: the slow half of emitting, and the choice of which partial block
+// leaves.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "bitmap.h"
+#include "block.h"
+#include "block_pool.h"
+#include "carpool/emitter.h"
+#include "carpool/policy.h"
+#include "layout.h"
+
+namespace carpool {
+
+// BlockSink is told of blocks that have become full.
+class BlockSink {
+ public:
+  virtual void publish(const Block& block, FlushCause cause) = 0;
+
+ protected:
+  ~BlockSink() = default;
+};
+
+// OpenTable keeps, for each (stage, bin), the block that this worker is filling.
+//
+// Blocks are kept in bitmaps by grade: 0 while they are one cache line, 1 while they are smaller
+// than a quarter of a full block, 2 above. So the fullest and the deepest are found without a scan.
+// Bits are in order of rank. Owned and used by one worker.
+class OpenTable final : public Emitter {
+ public:
+  OpenTable(const Layout& layout, const Policy& policy, BlockCache& cache, BlockSink& sink);
+
+  // begin_call prepares for the emits of a kernel or source; end_call returns their tally.
+  void begin_call(std::uint32_t emitting, const std::uint8_t* allowed) {
+    emitting_ = emitting;
+    allowed_ = allowed;
+    tally_ = 0;
+  }
+  std::uint64_t end_call() const { return tally_; }
+
+  // take_best removes the block that should leave first. False if there is none.
+  bool take_best(Block& block);
+
+  // take_older_than removes the oldest block if it was opened before `ticks`. Needs
+  // Layout::track_age.
+  bool take_older_than(std::uint64_t ticks, Block& block);
+
+  // How many blocks are open.
+  std::uint32_t count() const { return count_; }
+
+  // set_time says what time blocks that are opened from now on get.
+  void set_time(std::uint64_t ticks) { now_ = ticks; }
+
+  // drop_all forgets every open block and returns how many items were in them.
+  std::uint64_t drop_all();
+
+  // bytes_for returns how much memory the table of one worker takes; it never changes.
+  static std::size_t bytes_for(const Layout& layout);
+
+ private:
+  struct AgeLink {
+    std::uint32_t older = Bitmap::kNone;
+    std::uint32_t newer = Bitmap::kNone;
+    std::uint64_t opened = 0;
+  };
+
+  void make_room(std::uint32_t stage, std::uint32_t bin) override;
+  void open(const StageLayout& stage, std::uint32_t bin);
+  void grow(const StageLayout& stage, std::uint32_t bin);
+  Block remove(std::uint32_t bit);
+  std::uint32_t choose();
+  std::uint32_t choose_by_lane_function();
+
+  static std::uint32_t grade(const StageLayout& stage, std::uint32_t level) {
+    return level == stage.top_level ? 2 : level == 0 ? 0 : 1;
+  }
+  void link(std::uint32_t slot);
+  void unlink(std::uint32_t slot);
+
+  const Layout& layout_;
+  const Policy& policy_;
+  BlockCache& cache_;
+  BlockSink& sink_;
+  std::vector<detail::OpenSlot> table_;
+  std::array<Bitmap, kGrades> grades_;
+  std::vector<AgeLink> ages_;
+  std::uint32_t oldest_ = Bitmap::kNone;
+  std::uint32_t newest_ = Bitmap::kNone;
+  std::uint32_t cursor_ = 0;
+  std::uint32_t count_ = 0;
+  std::uint64_t now_ = 0;
+};
+
+}  // namespace carpool

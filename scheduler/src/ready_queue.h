@@ -1,0 +1,61 @@
+// One worker's published blocks, in the order of the policy, from which others steal.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "bitmap.h"
+#include "block.h"
+#include "spin_lock.h"
+
+namespace carpool {
+
+// ReadyQueue is a bucket queue: lanes of linked blocks and a bitmap of the lanes in use. All
+// operations take constant time.
+//
+// Properties and assumptions: push() and take() are the owner's, steal() is everybody's; guarded by
+// a spin lock, which costs an owner about as much as the barriers of a lock-free deque would, once
+// per block of some hundred items; lanes from `lanes` on are for partial blocks, so that every full
+// block comes before every partial one. `size` is readable without the lock by those who look for
+// work.
+class ReadyQueue {
+ public:
+  ReadyQueue(std::uint32_t lanes, std::atomic<std::uint32_t>& size)
+      : lanes_(lanes), heads_(2 * std::size_t{lanes}), used_(2 * lanes), size_(size) {}
+
+  void push(ReadyBlock* ready);
+
+  // take returns the best block, the newest or oldest of its lane, or null.
+  ReadyBlock* take(bool newest);
+
+  // steal takes the best block, the oldest of its lane, and more of them while they are tiny: up to
+  // `items` items or half of the queue. Returns a list linked by `newer`, or null if there is
+  // nothing or the lock is taken.
+  ReadyBlock* steal(std::uint32_t items);
+
+  // How many partial blocks are out, as the owner sees it.
+  std::uint32_t partials() const { return partials_.load(std::memory_order_relaxed); }
+  std::uint32_t size() const { return size_.load(std::memory_order_relaxed); }
+
+  // bytes_for returns how much memory a queue of that many lanes takes; it never changes.
+  static std::size_t bytes_for(std::uint32_t lanes) {
+    return 2 * std::size_t{lanes} * sizeof(Lane) + Bitmap(2 * lanes).bytes();
+  }
+
+ private:
+  struct Lane {
+    ReadyBlock* newest = nullptr;
+    ReadyBlock* oldest = nullptr;
+  };
+  ReadyBlock* unlink(std::uint32_t lane, bool newest);
+
+  std::uint32_t lanes_;
+  SpinLock lock_;
+  std::vector<Lane> heads_;
+  Bitmap used_;
+  std::atomic<std::uint32_t> partials_{0};
+  std::atomic<std::uint32_t>& size_;
+};
+
+}  // namespace carpool

@@ -1,0 +1,164 @@
+// run(): puts a run together and lets threads work on it.
+#include "carpool/run.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include <tbb/task_arena.h>
+
+#include "run_core.h"
+
+#if defined(__SANITIZE_THREAD__)
+#define CARPOOL_TSAN 1
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define CARPOOL_TSAN 1
+#endif
+#endif
+#ifdef CARPOOL_TSAN
+#include <sanitizer/tsan_interface.h>
+#endif
+
+namespace carpool {
+namespace {
+
+constexpr std::uint32_t kMostWorkers = 4096;
+
+// Arena is the caller's, the one made for this run, or the one the caller is in.
+class ArenaChoice {
+ public:
+  explicit ArenaChoice(const RunOptions& options) {
+    if (options.arena != nullptr) {
+      arena_ = options.arena;
+    } else if (options.threads != 0) {
+      arena_ = &own_.emplace(static_cast<int>(std::min(options.threads, kMostWorkers)));
+    } else {
+      arena_ = &own_.emplace(tbb::attach{});
+    }
+    arena_->initialize();
+    workers_ = static_cast<std::uint32_t>(std::max(1, arena_->max_concurrency()));
+    workers_ = std::min(workers_, kMostWorkers);
+    if (options.threads != 0) {
+      workers_ = std::min(workers_, options.threads);
+    }
+  }
+
+  tbb::task_arena& arena() { return *arena_; }
+  std::uint32_t workers() const { return workers_; }
+
+ private:
+  std::optional<tbb::task_arena> own_;
+  tbb::task_arena* arena_ = nullptr;
+  std::uint32_t workers_ = 1;
+};
+
+// What an invitation needs to know. It may arrive after the run is over; then the gate is closed,
+// and `core` is not touched.
+struct Destination {
+  std::shared_ptr<Gate> gate;
+  RunCore* core;
+};
+
+// oneTBB is not instrumented for the thread sanitizer, which therefore cannot see that an enqueued
+// functor is handed over properly. These two functions tell it.
+#ifdef CARPOOL_TSAN
+char tsan_tag;
+void hand_over() {
+  __tsan_release(&tsan_tag);
+}
+void receive() {
+  __tsan_acquire(&tsan_tag);
+}
+#else
+void hand_over() {}
+void receive() {}
+#endif
+
+void serve_isolated(RunCore& core, bool searching) {
+  // Isolated: a kernel that waits for a nested parallel_for must not pick up another worker's task
+  // meanwhile, which would run this scheduler inside that kernel.
+  tbb::this_task_arena::isolate([&] { core.serve(searching); });
+}
+
+// Invitation is the task of a helper: work until there is nothing to do, then return, which frees
+// the arena's slot.
+class Invitation {
+ public:
+  explicit Invitation(std::shared_ptr<const Destination> to) : to_(std::move(to)) { hand_over(); }
+  Invitation(const Invitation& other) : to_(other.to_) { hand_over(); }
+  Invitation(Invitation&& other) noexcept : to_(std::move(other.to_)) { hand_over(); }
+  Invitation& operator=(const Invitation&) = delete;
+  ~Invitation() = default;
+
+  void operator()() const {
+    receive();
+    const std::shared_ptr<const Destination> to = to_;
+    if (!to->gate->enter()) {
+      return;
+    }
+    do {
+      serve_isolated(*to->core, true);
+    } while (to->gate->leave(false) == Gate::Left::stays);
+  }
+
+ private:
+  std::shared_ptr<const Destination> to_;
+};
+
+class ThreadedRun final : private Summoner {
+ public:
+  ThreadedRun(const Graph& graph, const RunOptions& options, ArenaChoice& choice)
+      : arena_(choice.arena()),
+        core_(graph, options, choice.workers(), this),
+        destination_(std::make_shared<Destination>(Destination{core_.gate, &core_})) {}
+
+  RunReport run() {
+    bool searching = false;
+    do {
+      do {
+        arena_.execute([&] { serve_isolated(core_, searching); });
+        searching = true;
+      } while (core_.gate->leave(true) == Gate::Left::stays);
+      // Outside the arena: a thread asleep in there would be missing from every nested
+      // parallel_for.
+    } while (core_.gate->wait_for_invitation() && core_.gate->enter());
+    return core_.report();
+  }
+
+ private:
+  void summon() override { arena_.enqueue(Invitation(destination_)); }
+
+  tbb::task_arena& arena_;
+  RunCore core_;
+  std::shared_ptr<const Destination> destination_;
+};
+
+RunReport run_serial(const Graph& graph, const RunOptions& options) {
+  RunCore core(graph, options, 1, nullptr);
+  core.serve(false);
+  core.gate->leave(true);
+  return core.report();
+}
+
+}  // namespace
+
+RunReport run(const Graph& graph, const RunOptions& options) {
+  graph.validate();
+  if (options.mode == RunMode::serial) {
+    return run_serial(graph, options);
+  }
+  ArenaChoice choice(options);
+  return ThreadedRun(graph, options, choice).run();
+}
+
+std::size_t worst_case_bytes(const Graph& graph, const RunOptions& options) {
+  graph.validate();
+  const std::uint32_t workers =
+      options.mode == RunMode::serial ? 1 : ArenaChoice(options).workers();
+  const Layout layout(graph, options, workers);
+  return layout.block_bytes() + layout.table_bytes();
+}
+
+}  // namespace carpool

@@ -1,0 +1,367 @@
+// The worker's loop.
+#include "worker.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "spin_lock.h"
+#include "ticks.h"
+
+namespace carpool {
+namespace {
+
+// Batches shorter than this are timed one in eight: reading the clock twice costs as much as some
+// items do.
+constexpr std::uint32_t kTinyBatch = 32;
+constexpr std::uint32_t kTinySample = 8;
+
+// How long a worker without work looks around before it leaves, and how long an owner waits after
+// sharing in vain: about the cost of an invitation. In ticks; at 1 to 4 GHz some 5 to 20
+// microseconds.
+constexpr std::uint64_t kSearchTicks = 20'000;
+constexpr std::uint64_t kFirstSharePause = 40'000;
+constexpr std::uint64_t kLongestSharePause = 4'000'000;
+
+}  // namespace
+
+Worker::Worker(RunCore& core, std::uint32_t index)
+    : core_(core),
+      layout_(core.layout),
+      gate_(*core.gate),
+      index_(index),
+      newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
+      always_timed_(core.options.deadline.has_value() || core.options.flush.linger.count() > 0 ||
+                    core.options.progress != nullptr),
+      cache_(core.pool, core.layout),
+      credits_(core.credits, core.layout.workers),
+      ready_(core.layout.lanes, core.gate->ready_size(index)),
+      open_(core.layout, core.options.policy, cache_, *this),
+      stats_(core.layout.stages.size(), core.graph.sources().size(), core.layout.slots),
+      next_victim_(index + 1),
+      next_source_(index),
+      share_pause_(kFirstSharePause),
+      linger_ticks_(core.linger_ticks) {}
+
+void Worker::serve(bool searching) {
+  const std::uint64_t came = read_ticks();
+  ++stats_.arrivals;
+  searching_ = searching;
+  search_began_ = now_ = came;
+  try {
+    work_until_idle();
+  } catch (
+      ...) {  // from a kernel, a source, a policy or a progress callback, or for lack of memory
+    core_.fail(std::current_exception());
+  }
+  credits_.return_all();
+  const std::uint64_t left = read_ticks();
+  if (searching_) {
+    stats_.search_ticks += left - search_began_;
+  } else {
+    gate_.begin_search();  // leave() expects it
+  }
+  stats_.present_ticks += left - came;
+}
+
+void Worker::work_until_idle() {
+  Work work;
+  while (!gate_.stopped()) {
+    if (acquire(work)) {
+      if (searching_) {
+        found_work();
+      }
+      perform(work);
+    } else if (!search()) {
+      return;
+    }
+  }
+}
+
+// The order of the whole scheduler is here: what is ready; then new items while credits are plenty,
+// which keeps this worker on its own data; then what others have ready; then partial blocks; and
+// new items once more, one by one if need be.
+bool Worker::acquire(Work& work) {
+  return take_ready(work) || take_source(work, false) || steal(work) || take_open(work) ||
+         take_source(work, true);
+}
+
+bool Worker::take_ready(Work& work) {
+  ReadyBlock* ready = ready_.take(newest_first_);
+  if (ready == nullptr) {
+    return false;
+  }
+  unpack(ready, work);
+  taken_back_ += work.cause == FlushCause::asked ? 1 : 0;
+  return true;
+}
+
+void Worker::unpack(ReadyBlock* ready, Work& work) {
+  work.block = ready->block;
+  work.cause = ready->cause;
+  work.is_source = false;
+  cache_.release(layout_.node_class, reinterpret_cast<std::byte*>(ready));
+}
+
+bool Worker::take_source(Work& work, bool last_resort) {
+  if (!core_.sources_open()) {
+    return false;
+  }
+  const auto count = static_cast<std::uint32_t>(layout_.source_charge.size());
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t source = (next_source_ + i) % count;
+    const auto charge = static_cast<std::int64_t>(layout_.source_charge[source]);
+    const std::int64_t burst = core_.graph.sources()[source].options.burst;
+    // Not for every single credit: an eighth of all, or a burst.
+    const std::int64_t items =
+        last_resort ? 1 : std::clamp<std::int64_t>(core_.credits.limit() / charge / 8, 1, burst);
+    if (credits_.pocket() + core_.credits.available() < items * charge ||
+        !core_.try_enter_source(source)) {
+      continue;
+    }
+    const std::int64_t got = credits_.reserve(items * charge, burst * charge);
+    if (got == 0) {
+      core_.leave_source(source, false);
+      continue;
+    }
+    work.is_source = true;
+    work.source = source;
+    work.budget = static_cast<std::uint32_t>(std::min(got / charge, burst));
+    next_source_ = source + 1;
+    return true;
+  }
+  return false;
+}
+
+bool Worker::steal(Work& work) {
+  const std::uint32_t workers = layout_.workers;
+  for (std::uint32_t i = 0; i < workers; ++i) {
+    const std::uint32_t victim = (next_victim_ + i) % workers;
+    if (victim == index_) {
+      continue;
+    }
+    ReadyQueue& queue = core_.worker(victim).ready_;
+    ReadyBlock* list = queue.steal(kTinyBatch);
+    if (list == nullptr) {
+      continue;
+    }
+    next_victim_ = victim;
+    ReadyBlock* rest = list->newer;
+    ++stats_.stages[list->block.stage].steals;
+    unpack(list, work);
+    while (rest != nullptr) {
+      ReadyBlock* next = rest->newer;
+      ++stats_.stages[rest->block.stage].steals;
+      ready_.push(rest);
+      rest = next;
+    }
+    return true;
+  }
+  return false;
+}
+
+bool Worker::take_open(Work& work) {
+  work.cause = FlushCause::idle;
+  work.is_source = false;
+  return open_.take_best(work.block);
+}
+
+void Worker::perform(const Work& work) {
+  if (work.is_source) {
+    call_source(work);
+  } else {
+    run_batch(work);
+  }
+  after_call();
+}
+
+void Worker::run_batch(const Work& work) {
+  const Block& block = work.block;
+  const bool tiny = block.items < kTinyBatch && !always_timed_;
+  const bool timed = !tiny || ++tiny_batches_ >= kTinySample;
+  const std::uint64_t began = timed ? read_ticks() : 0;
+  open_.begin_call(block.stage, core_.allowed_from(block.stage));
+  core_.graph.stages()[block.stage].kernel(
+      {.data = block.data, .items = block.items, .bin = block.bin, .worker = index_}, open_);
+  std::uint64_t ticks = 0;
+  if (timed) {
+    now_ = read_ticks();
+    ticks = (now_ - began) * (tiny ? tiny_batches_ : 1);
+    tiny_batches_ = tiny ? 0 : tiny_batches_;
+  }
+  count_batch(work, ticks);
+  const StageLayout& stage = layout_.stages[block.stage];
+  const std::uint64_t tally = open_.end_call();
+  credits_.settle(static_cast<std::int64_t>(tally >> 32), std::int64_t{stage.weight} * block.items);
+  cache_.release(stage.levels[block.level].pool_class, block.data);
+}
+
+void Worker::count_batch(const Work& work, std::uint64_t ticks) {
+  const Block& block = work.block;
+  StageStats& stage = stats_.stages[block.stage];
+  const std::uint32_t lanes = layout_.stages[block.stage].lanes;
+  ++stage.batches;
+  stage.items += block.items;
+  stage.seats += lanes == 1 ? block.items : (block.items + lanes - 1) / lanes * lanes;
+  stage.kernel_ticks += ticks;
+  ++stage.causes[static_cast<std::size_t>(work.cause)];
+  BinReport& bin = stats_.bins[layout_.stages[block.stage].first_slot + block.bin];
+  ++bin.batches;
+  bin.items += block.items;
+  stats_.batches.add(1);
+  stats_.items.add(block.items);
+}
+
+void Worker::call_source(const Work& work) {
+  const std::uint64_t began = read_ticks();
+  SourceContext context{.worker = index_, .budget = work.budget};
+  open_.set_time(began);
+  open_.begin_call(
+      static_cast<std::uint32_t>(layout_.stages.size()) + work.source,
+      core_.allowed_from(static_cast<std::uint32_t>(layout_.stages.size()) + work.source));
+  const SourceStatus status = core_.graph.sources()[work.source].function(context, open_);
+  const std::uint64_t tally = open_.end_call();
+  if ((tally & 0xffffffffU) > work.budget) {
+    throw std::logic_error("carpool: source '" + core_.graph.sources()[work.source].options.name +
+                           "' emitted more items than its budget allowed");
+  }
+  credits_.settle(static_cast<std::int64_t>(tally >> 32), 0);
+  core_.leave_source(work.source, status == SourceStatus::exhausted);
+  now_ = read_ticks();
+  SourceStats& source = stats_.sources[work.source];
+  ++source.calls;
+  source.items += tally & 0xffffffffU;
+  source.ticks += now_ - began;
+}
+
+void Worker::after_call() {
+  check_end();
+  if (linger_ticks_ != 0) {
+    flush_lingering();
+  }
+  const Gate::View seen =
+      gate_.relaxed_view();  // relaxed: a hint, and looked at again after every call
+  if (seen.searching() != 0 || gate_.hungry(seen)) {
+    share();
+  }
+}
+
+void Worker::check_end() {
+  if (core_.options.cancel.cancelled()) {
+    core_.end(Outcome::cancelled);
+  } else if (core_.options.deadline &&
+             std::chrono::steady_clock::now() >= *core_.options.deadline) {
+    core_.end(Outcome::deadline);
+  }
+  if (core_.options.progress) {
+    core_.maybe_report_progress();
+  }
+}
+
+void Worker::flush_lingering() {
+  open_.set_time(now_);
+  Block block;
+  while (ready_.partials() < kPartialsPerWorker && now_ > linger_ticks_ &&
+         open_.take_older_than(now_ - linger_ticks_, block)) {
+    publish(block, FlushCause::linger);
+  }
+}
+
+// Somebody is without work. Let them have half of the open blocks, unless there is something
+// published to take, or they did not come for what they were offered last time: moving a few tiny
+// items costs more than handling them here.
+void Worker::share() {
+  if (ready_.size() == 0 && core_.options.flush.idle && now_ >= share_after_) {
+    const bool in_vain = shared_ != 0 && taken_back_ >= shared_;
+    share_pause_ = in_vain ? std::min(share_pause_ * 2, kLongestSharePause) : kFirstSharePause;
+    share_after_ = now_ + share_pause_;
+    shared_ = taken_back_ = 0;
+    const std::uint32_t count = std::min(open_.count() / 2, kPartialsPerWorker);
+    Block block;
+    for (std::uint32_t i = 0; i < count && open_.take_best(block); ++i) {
+      publish(block, FlushCause::asked);
+      ++shared_;
+    }
+  } else if (ready_.size() != 0 || core_.source_ready()) {
+    core_.invite();
+  }
+}
+
+void Worker::publish(const Block& block, FlushCause cause) {
+  auto* ready = ::new (cache_.allocate(layout_.node_class)) ReadyBlock;
+  ready->block = block;
+  ready->cause = cause;
+  ready->partial = cause != FlushCause::full && cause != FlushCause::count;
+  ready->lane = lane_of(block);
+  ready_.push(ready);
+  if (gate_.hungry(gate_.view())) {
+    core_.invite();
+  }
+}
+
+std::uint32_t Worker::lane_of(const Block& block) const {
+  const StageLayout& stage = layout_.stages[block.stage];
+  switch (core_.options.policy.kind()) {
+    case Policy::Kind::deepest_first:
+      return stage.rank_lane;
+    case Policy::Kind::fullest_first: {
+      const std::uint64_t filled =
+          std::uint64_t{block.items} * (layout_.lanes - 1) / stage.block_items;
+      return layout_.lanes - 1 - static_cast<std::uint32_t>(filled);
+    }
+    case Policy::Kind::oldest_first:
+      return 0;
+    case Policy::Kind::custom:
+      break;
+  }
+  const std::uint32_t lane = core_.options.policy.lane_function()({.stage = block.stage,
+                                                                   .bin = block.bin,
+                                                                   .items = block.items,
+                                                                   .capacity = stage.block_items,
+                                                                   .rank = stage.rank});
+  return std::min(lane, layout_.lanes - 1);
+}
+
+// search looks around for a moment. True: try again. False: there is nothing, leave.
+bool Worker::search() {
+  credits_.return_all();  // before looking at the sources: see Gate
+  if (!searching_) {
+    searching_ = true;
+    search_began_ = read_ticks();
+    gate_.begin_search();
+  }
+  if (core_.source_ready()) {
+    return true;
+  }
+  while (!gate_.stopped() && read_ticks() - search_began_ < kSearchTicks) {
+    const Gate::View seen = gate_.relaxed_view();
+    if (seen.active() <= seen.searching()) {
+      break;  // nobody is at work who could make some
+    }
+    if (gate_.any_ready() || core_.source_ready()) {
+      return true;
+    }
+    cpu_pause();
+  }
+  return false;
+}
+
+void Worker::found_work() {
+  searching_ = false;
+  stats_.search_ticks += read_ticks() - search_began_;
+  // Others kept quiet while somebody was searching. If that was the last searcher and there is
+  // more, call the next.
+  if (gate_.hungry(gate_.end_search()) && gate_.any_ready()) {
+    core_.invite();
+  }
+}
+
+std::uint64_t Worker::drop_all() {
+  std::uint64_t items = open_.drop_all();
+  while (const ReadyBlock* ready = ready_.take(true)) {
+    items += ready->block.items;
+  }
+  return items;
+}
+
+}  // namespace carpool
