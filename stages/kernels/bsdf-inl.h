@@ -1,0 +1,139 @@
+// The material model: glTF metallic-roughness with KHR_materials_ior and KHR_materials_specular.
+//
+// Prepare once per vertex, then evaluate and sample. Directions are unit vectors in the local frame,
+// z = shading normal, wo.z > 0. Where this departs from the glTF sample BRDF, stages/README.md says by how
+// much. Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_BSDF_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_BSDF_INL_H_
+#undef CARPOOL_STAGES_KERNELS_BSDF_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_BSDF_INL_H_
+#endif
+
+#include "stages/kernels/bsdf_cosine-inl.h"
+#include "stages/kernels/bsdf_specular-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// A surface point's material after texturing. Values outside their range are clamped to it.
+template <class D>
+struct SurfaceParams {
+  Vec3<D> base_color;      // [0, 1]
+  Real<D> metallic;        // [0, 1]
+  Real<D> roughness;       // [0.01, 1]; alpha is its square
+  Real<D> ior;             // at least 1
+  Mask<D> ior_zero;        // KHR_materials_ior 0: the Fresnel term is 1
+  Real<D> specular;        // [0, 1]
+  Vec3<D> specular_color;  // at least 0
+};
+
+/// All lobes, from the top down. A new lobe is a file of its own, named here and set in PrepareBsdf.
+template <class D>
+using Bsdf = LobeSet<D, SpecularLobe, CosineLobe>;
+
+/// Schlick's term of the dielectric and of the metal, before they are mixed.
+template <class D>
+struct SchlickTerm {
+  Vec3<D> f0;
+  Real<D> f90;
+};
+
+template <class D>
+HWY_INLINE Vec3<D> Clamp01(D d, const Vec3<D>& c) {
+  const Real<D> zero = hn::Zero(d), one = Splat(d, 1);
+  return {hn::Min(hn::Max(c.x, zero), one), hn::Min(hn::Max(c.y, zero), one), hn::Min(hn::Max(c.z, zero), one)};
+}
+
+/// KHR_materials_specular: f0 = min(f0(ior) color, 1) specular, f90 = specular.
+template <class D>
+HWY_INLINE SchlickTerm<D> DielectricInterface(D d, const SurfaceParams<D>& p) {
+  const Real<D> one = Splat(d, 1);
+  const Real<D> ior = hn::Max(p.ior, one);
+  const Real<D> specular = hn::Min(hn::Max(p.specular, hn::Zero(d)), one);
+  const Real<D> f0 = hn::IfThenElse(p.ior_zero, one, NormalReflectance(d, ior));
+  const Real<D> f90 = hn::IfThenElse(p.ior_zero, one, DielectricF90(d, ior));
+  return {Scale<D>(Clamp01<D>(d, Scale<D>(p.specular_color, f0)), specular), f90 * specular};
+}
+
+template <class D>
+HWY_INLINE Vec3<D> MultiScatterColor(D d, const SchlickTerm<D>& i, Real<D> average_m) {
+  return {MultiScatterShare(d, SchlickAverage(d, i.f0.x, i.f90), average_m),
+          MultiScatterShare(d, SchlickAverage(d, i.f0.y, i.f90), average_m),
+          MultiScatterShare(d, SchlickAverage(d, i.f0.z, i.f90), average_m)};
+}
+
+template <class D>
+HWY_INLINE Real<D> SumComponents(const Vec3<D>& c) {
+  return c.x + c.y + c.z;
+}
+
+/// The part of PrepareBsdf that needs both interfaces and the albedos at wo.
+template <class D>
+HWY_INLINE void PrepareLobes(D d, const SchlickTerm<D>& dielectric, const Vec3<D>& base, Real<D> metallic,
+                             const AlbedoAt<D>& at_wo, Bsdf<D>& bsdf) {
+  const Real<D> one = Splat(d, 1);
+  const Real<D> rest = one - metallic;
+  const AlbedoAt<D>& average = bsdf.row.average;
+  const SchlickTerm<D> metal{base, one};
+
+  // GGX is linear in F0 and F90, so one lobe with mixed values is the mixture of two lobes.
+  bsdf.f0 = MulAdd<D>(Sub<D>(base, dielectric.f0), metallic, dielectric.f0);
+  bsdf.f90 = hn::MulAdd(one - dielectric.f90, metallic, dielectric.f90);
+  const Real<D> single = hn::Max(one - at_wo.m - at_wo.b, hn::Zero(d));
+  bsdf.SpecularLobe<D>::weight = hn::MulAdd(SumComponents<D>(bsdf.f0), single, Splat(d, 3) * bsdf.f90 * at_wo.b);
+
+  const Vec3<D> dielectric_multi = MultiScatterColor<D>(d, dielectric, average.m);
+  Vec3<D> multi = Scale<D>(dielectric_multi, rest);
+  if (!hn::AllFalse(d, hn::Gt(metallic, hn::Zero(d)))) {
+    multi = MulAdd<D>(MultiScatterColor<D>(d, metal, average.m), metallic, multi);
+  }
+  bsdf.multi = Scale<D>(multi, SafeDiv(d, at_wo.m, average.m));
+
+  // 1 - E, with the brightest channel's E for all channels, as KHR_materials_specular has it.
+  const Real<D> f0 = MaxComponent<D>(dielectric.f0);
+  const Real<D> share = MaxComponent<D>(dielectric_multi);
+  bsdf.through = one - f0;
+  bsdf.through_m = share - f0;
+  bsdf.through_b = dielectric.f90 - f0;
+  const Real<D> average_passed = bsdf.Passed(d, average);
+  const Real<D> scale = SafeDiv(d, bsdf.Passed(d, at_wo), average_passed) * rest;
+  bsdf.diffuse = Scale<D>(base, scale);
+  bsdf.CosineLobe<D>::weight = hn::MulAdd(SumComponents<D>(bsdf.diffuse), average_passed,
+                                          SumComponents<D>(bsdf.multi) * average.m);
+}
+
+template <class D>
+HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceParams<D>& params, const Vec3<D>& wo) {
+  Bsdf<D> bsdf;
+  bsdf.tables = tables;
+  bsdf.row = FindAlbedoRow<D>(d, tables, params.roughness);
+  bsdf.alpha = bsdf.row.alpha;
+  bsdf.root_o = SmithRoot<D>(wo, bsdf.alpha);
+  const Real<D> metallic = hn::Min(hn::Max(params.metallic, hn::Zero(d)), Splat(d, 1));
+  const AlbedoAt<D> at_wo = LookUpAlbedo<D>(d, tables, bsdf.row, hn::Max(wo.z, hn::Zero(d)));
+  PrepareLobes<D>(d, DielectricInterface<D>(d, params), Clamp01<D>(d, params.base_color), metallic, at_wo, bsdf);
+  bsdf.SumWeights(d);
+  return bsdf;
+}
+
+/// f cos and the sampling density of one direction; zero where wi.z <= 0.
+template <class D>
+HWY_INLINE BsdfValue<D> EvaluateBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, const Vec3<D>& wi) {
+  return bsdf.Evaluate(d, wo, wi);
+}
+
+template <class D>
+HWY_INLINE BsdfSample<D> SampleBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, Real<D> u_lobe, const Vec2<D>& u) {
+  const Vec3<D> wi = bsdf.Sample(d, wo, u_lobe, u);
+  const BsdfValue<D> value = bsdf.Evaluate(d, wo, wi);
+  const Mask<D> valid = hn::Gt(value.pdf, hn::Zero(d));
+  const Real<D> inverse = SafeDiv(d, Splat(d, 1), value.pdf);
+  return {Select<D>(valid, wi, Splat3(d, 0, 0, 1)), Scale<D>(value.f_cos, inverse), value.pdf, valid};
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard

@@ -1,0 +1,81 @@
+// The GGX microfacet distribution with height-correlated Smith shadowing, sampled by visible normals.
+//
+// Directions are in the local frame (z = shading normal). Every formula is written so that nothing is
+// divided by a cosine and no 1 - cos^2 is taken: finite at grazing angles, exact to rounding at alpha 1e-4.
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_KERNELS_MICROFACET_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_KERNELS_MICROFACET_INL_H_
+#undef CARPOOL_STAGES_KERNELS_MICROFACET_INL_H_
+#else
+#define CARPOOL_STAGES_KERNELS_MICROFACET_INL_H_
+#endif
+
+#include <numbers>
+
+#include "stages/sampling/warp-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// sqrt(cos^2 + alpha^2 sin^2): Smith's Lambda is (this / cos - 1) / 2.
+template <class D>
+HWY_INLINE Real<D> SmithRoot(const Vec3<D>& w, Real<D> alpha) {
+  const Real<D> across = hn::MulAdd(w.x, w.x, w.y * w.y);
+  return hn::Sqrt(hn::MulAdd(alpha * alpha, across, w.z * w.z));
+}
+
+/// D(h) for a half-vector of any length (Walter et al. 2007, as ((x/a)^2 + (y/a)^2 + z^2)^-2 / (pi a^2));
+/// 0 for a half-vector too short to have a direction.
+template <class D>
+HWY_INLINE Real<D> GgxDistribution(D d, const Vec3<D>& half, Real<D> length2, Real<D> alpha) {
+  const Real<D> inverse_alpha = Splat(d, 1) / alpha;
+  const Real<D> x = half.x * inverse_alpha;
+  const Real<D> y = half.y * inverse_alpha;
+  const Real<D> q = hn::MulAdd(x, x, hn::MulAdd(y, y, half.z * half.z));
+  const Real<D> ratio = SafeDiv(d, length2, q) * inverse_alpha;
+  return ratio * ratio * Splat(d, 1 / std::numbers::pi);
+}
+
+/// Density of `wi` when its half-vector is drawn by SampleVisibleNormal: G1(wo) D(h) / (4 wo.z).
+template <class D>
+HWY_INLINE Real<D> VisibleNormalPdf(D d, const Vec3<D>& wo, Real<D> root_o, Real<D> distribution) {
+  return distribution * Splat(d, 0.5) / (wo.z + root_o);
+}
+
+/// D G2 / (4 wo.z), the microfacet BRDF times wi.z without its Fresnel term; G2 is Smith's
+/// height-correlated shadowing (Heitz 2014, eq. 99).
+template <class D>
+HWY_INLINE Real<D> MicrofacetCosine(D d, const Vec3<D>& wo, const Vec3<D>& wi, Real<D> root_o, Real<D> root_i,
+                                    Real<D> distribution) {
+  const Real<D> joint = hn::MulAdd(wi.z, root_o, wo.z * root_i);
+  return distribution * Splat(d, 0.5) * SafeDiv(d, wi.z, joint);
+}
+
+/// A microfacet normal as seen from `wo`, unit length (Dupuy and Benyoub 2023, "Sampling Visible GGX
+/// Normals with Spherical Caps").
+template <class D>
+HWY_INLINE Vec3<D> SampleVisibleNormal(D d, const Vec3<D>& wo, Real<D> alpha, const Vec2<D>& u) {
+  const Vec3<D> stretched = Normalize<D>(d, {wo.x * alpha, wo.y * alpha, wo.z});
+  // The cap reaches from the pole, z = 1, down to z = -stretched.z; heights are measured from its ends.
+  const Real<D> whole = Splat(d, 1) + stretched.z;
+  const Real<D> below_pole = u.y * whole;
+  const Real<D> sine = SafeSqrt(d, below_pole * (Splat(d, 2) - below_pole));
+  const Vec2<D> turn = CosSinTurns(d, u.x);
+  const Vec3<D> half{hn::MulAdd(sine, turn.x, stretched.x), hn::MulAdd(sine, turn.y, stretched.y),
+                     (Splat(d, 1) - u.y) * whole};
+  return Normalize<D>(d, {half.x * alpha, half.y * alpha, half.z});
+}
+
+/// Mirror image of wo about a unit normal.
+template <class D>
+HWY_INLINE Vec3<D> Reflect(const Vec3<D>& wo, const Vec3<D>& normal) {
+  const Real<D> twice = Dot(wo, normal) + Dot(wo, normal);
+  return {hn::MulSub(normal.x, twice, wo.x), hn::MulSub(normal.y, twice, wo.y),
+          hn::MulSub(normal.z, twice, wo.z)};
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
