@@ -68,7 +68,7 @@ install_missing_packages() {
     fail 2 "missing packages: ${missing[*]}; there is no apt-get here, so install them (or their equivalents) yourself"
   if ((EUID != 0)); then
     command -v sudo >/dev/null ||
-      fail 2 "missing packages: ${missing[*]}; there is no sudo here, so run as root: apt-get install ${missing[*]}"
+      fail 2 "missing packages: ${missing[*]}; there is no sudo here, so have root install them with apt-get"
     as_root=(sudo)
   fi
   say "installing ${missing[*]}"
