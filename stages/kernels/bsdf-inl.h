@@ -11,7 +11,8 @@
 #define CARPOOL_STAGES_KERNELS_BSDF_INL_H_
 #endif
 
-#include "stages/kernels/bsdf_cosine-inl.h"
+#include "stages/kernels/bsdf_diffuse-inl.h"
+#include "stages/kernels/bsdf_multiscatter-inl.h"
 #include "stages/kernels/bsdf_specular-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -31,7 +32,10 @@ struct SurfaceParams {
 
 /// All lobes, from the top down. A new lobe is a file of its own, named here and set in PrepareBsdf.
 template <class D>
-using Bsdf = LobeSet<D, SpecularLobe, CosineLobe>;
+struct Bsdf : LobeSet<D, SpecularLobe, MultiScatterLobe, DiffuseLobe> {
+  BsdfTablesView tables;
+  AlbedoRow<D> row;  // of the base's roughness
+};
 
 /// Schlick's term of the dielectric and of the metal, before they are mixed.
 template <class D>
@@ -90,6 +94,8 @@ HWY_INLINE void PrepareLobes(D d, const SchlickTerm<D>& dielectric, const Vec3<D
     multi = MulAdd<D>(MultiScatterColor<D>(d, metal, average.m), metallic, multi);
   }
   bsdf.multi = Scale<D>(multi, SafeDiv(d, at_wo.m, average.m));
+  bsdf.MultiScatterLobe<D>::weight = SumComponents<D>(bsdf.multi) * average.m;
+  bsdf.SetSpread(d, bsdf.row.log2_spread);
 
   // 1 - E, with the brightest channel's E for all channels, as KHR_materials_specular has it.
   const Real<D> f0 = MaxComponent<D>(dielectric.f0);
@@ -100,8 +106,7 @@ HWY_INLINE void PrepareLobes(D d, const SchlickTerm<D>& dielectric, const Vec3<D
   const Real<D> average_passed = bsdf.Passed(d, average);
   const Real<D> scale = SafeDiv(d, bsdf.Passed(d, at_wo), average_passed) * rest;
   bsdf.diffuse = Scale<D>(base, scale);
-  bsdf.CosineLobe<D>::weight = hn::MulAdd(SumComponents<D>(bsdf.diffuse), average_passed,
-                                          SumComponents<D>(bsdf.multi) * average.m);
+  bsdf.DiffuseLobe<D>::weight = SumComponents<D>(bsdf.diffuse) * average_passed;
 }
 
 template <class D>
@@ -121,13 +126,19 @@ HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceP
 /// f cos and the sampling density of one direction; zero where wi.z <= 0.
 template <class D>
 HWY_INLINE BsdfValue<D> EvaluateBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, const Vec3<D>& wi) {
-  return bsdf.Evaluate(d, wo, wi);
+  DirectionPair<D> pair = MakePair(d, wo, wi);
+  const Real<D> users = bsdf.MultiScatterLobe<D>::weight + bsdf.DiffuseLobe<D>::weight;
+  const Mask<D> used = hn::And(pair.reflected, hn::Gt(users, hn::Zero(d)));
+  if (!hn::AllFalse(d, used)) {
+    pair.albedo = LookUpAlbedo<D>(d, bsdf.tables, bsdf.row, hn::IfThenElseZero(used, wi.z));
+  }
+  return bsdf.Evaluate(d, pair);
 }
 
 template <class D>
 HWY_INLINE BsdfSample<D> SampleBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, Real<D> u_lobe, const Vec2<D>& u) {
   const Vec3<D> wi = bsdf.Sample(d, wo, u_lobe, u);
-  const BsdfValue<D> value = bsdf.Evaluate(d, wo, wi);
+  const BsdfValue<D> value = EvaluateBsdf<D>(d, bsdf, wo, wi);
   const Mask<D> valid = hn::Gt(value.pdf, hn::Zero(d));
   const Real<D> inverse = SafeDiv(d, Splat(d, 1), value.pdf);
   return {Select<D>(valid, wi, Splat3(d, 0, 0, 1)), Scale<D>(value.f_cos, inverse), value.pdf, valid};

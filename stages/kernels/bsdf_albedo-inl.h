@@ -30,26 +30,8 @@ struct AlbedoRow {
   Real<D> fraction;   // towards the next row
   Index<D> base;      // first cosine of the row
   AlbedoAt<D> average;  // cosine-weighted means over the hemisphere
+  Real<D> log2_spread;  // see kSpreadPerAlpha2
 };
-
-/// Clamps roughness to [kMinRoughness, 1], so alpha to [1e-4, 1].
-template <class D>
-HWY_INLINE AlbedoRow<D> FindAlbedoRow(D d, const BsdfTablesView& tables, Real<D> roughness) {
-  const IndexTag<D> di;
-  const Real<D> low = Splat(d, kMinRoughness);
-  const Real<D> r = hn::Min(hn::Max(roughness, low), Splat(d, 1));
-  const Real<D> unit = (r - low) * Splat(d, 1 / (1 - kMinRoughness));
-  const Real<D> position = unit * Splat(d, kAlbedoRoughnesses - 1);
-  const Index<D> row = hn::Min(ToIndex(d, position), hn::Set(di, kAlbedoRoughnesses - 2));
-  const Real<D> average_position = unit * Splat(d, kAverageRoughnesses - 1);
-  const Index<D> knot = hn::Min(ToIndex(d, average_position), hn::Set(di, kAverageRoughnesses - 2));
-  const Real<D> t = average_position - FromIndex(d, knot);
-  const Index<D> at = knot + knot;
-  const Real<D> m0 = LookUpFloat(d, tables.average, at), m1 = LookUpFloat(d, tables.average + 2, at);
-  const Real<D> b0 = LookUpFloat(d, tables.average + 1, at), b1 = LookUpFloat(d, tables.average + 3, at);
-  return {r * r, position - FromIndex(d, row), row * hn::Set(di, kAlbedoCosines),
-          {hn::MulAdd(t, m1 - m0, m0), hn::MulAdd(t, b1 - b0, b0)}};
-}
 
 template <class D>
 HWY_INLINE Real<D> UpperHalf16(D d, Index<D> word) {
@@ -63,6 +45,29 @@ HWY_INLINE Real<D> LowerHalf16(D d, Index<D> word) {
 template <class D>
 HWY_INLINE Real<D> LerpReal(Real<D> t, Real<D> a, Real<D> b) {
   return hn::MulAdd(t, b - a, a);
+}
+
+/// Clamps roughness to [kMinRoughness, 1], so alpha to [1e-4, 1].
+template <class D>
+HWY_INLINE AlbedoRow<D> FindAlbedoRow(D d, const BsdfTablesView& tables, Real<D> roughness) {
+  const IndexTag<D> di;
+  const Real<D> low = Splat(d, kMinRoughness);
+  const Real<D> r = hn::Min(hn::Max(roughness, low), Splat(d, 1));
+  const Real<D> unit = (r - low) * Splat(d, 1 / (1 - kMinRoughness));
+  const Real<D> position = unit * Splat(d, kAlbedoRoughnesses - 1);
+  const Index<D> row = hn::Min(ToIndex(d, position), hn::Set(di, kAlbedoRoughnesses - 2));
+  const Real<D> average_position = unit * Splat(d, kAverageRoughnesses - 1);
+  const Index<D> knot = hn::Min(ToIndex(d, average_position), hn::Set(di, kAverageRoughnesses - 2));
+  const Real<D> t = average_position - FromIndex(d, knot);
+  const Index<D> at = knot * hn::Set(di, kAverageColumns);
+  const float* low_knot = tables.average;
+  const float* high_knot = tables.average + kAverageColumns;
+  return {r * r,
+          position - FromIndex(d, row),
+          row * hn::Set(di, kAlbedoCosines),
+          {LerpReal<D>(t, LookUpFloat(d, low_knot, at), LookUpFloat(d, high_knot, at)),
+           LerpReal<D>(t, LookUpFloat(d, low_knot + 1, at), LookUpFloat(d, high_knot + 1, at))},
+          LerpReal<D>(t, LookUpFloat(d, low_knot + 2, at), LookUpFloat(d, high_knot + 2, at))};
 }
 
 /// Bilinear look-up at cosine mu >= 0.

@@ -16,7 +16,7 @@
 #define CARPOOL_STAGES_KERNELS_BSDF_LOBES_INL_H_
 #endif
 
-#include "stages/simd/lanes-inl.h"
+#include "stages/kernels/bsdf_albedo-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
@@ -25,17 +25,19 @@ namespace carpool::stages::HWY_NAMESPACE {
 template <class D>
 struct DirectionPair {
   Vec3<D> wo, wi;
-  Mask<D> reflected;   // wi is above the surface, as wo is
-  Vec3<D> half;        // wo + wi, not normalised
-  Real<D> length2;     // of `half`
-  Real<D> half_cosine; // between the half-vector and either direction
+  Mask<D> reflected;    // wi is above the surface, as wo is
+  Vec3<D> half;         // wo + wi, not normalised
+  Real<D> length2;      // of `half`
+  Real<D> half_cosine;  // between the half-vector and either direction
+  AlbedoAt<D> albedo;   // at wi for the base's roughness; zero where no lobe uses it
 };
 
 template <class D>
 HWY_INLINE DirectionPair<D> MakePair(D d, const Vec3<D>& wo, const Vec3<D>& wi) {
   const Vec3<D> half = Add<D>(wo, wi);
   const Real<D> length2 = Dot<D>(half, half);
-  return {wo, wi, hn::Gt(wi.z, hn::Zero(d)), half, length2, hn::Sqrt(length2) * Splat(d, 0.5)};
+  return {wo,      wi, hn::Gt(wi.z, hn::Zero(d)), half, length2, hn::Sqrt(length2) * Splat(d, 0.5),
+          {hn::Zero(d), hn::Zero(d)}};
 }
 
 /// The running sum of EvaluateBsdf, from the top lobe down.
@@ -72,8 +74,7 @@ struct LobeSet : Lobes<D>... {
     ((total_weight = total_weight + Lobes<D>::weight), ...);
   }
 
-  HWY_INLINE BsdfValue<D> Evaluate(D d, const Vec3<D>& wo, const Vec3<D>& wi) const {
-    const DirectionPair<D> pair = MakePair(d, wo, wi);
+  HWY_INLINE BsdfValue<D> Evaluate(D d, const DirectionPair<D>& pair) const {
     LobeSum<D> sum{Splat3(d, 0, 0, 0), hn::Zero(d), Splat(d, 1)};
     (Lobes<D>::Evaluate(d, pair, sum), ...);
     return {sum.f_cos, SafeDiv(d, sum.weighted_pdf, total_weight)};

@@ -45,6 +45,23 @@ HWY_INLINE Vec2<D> CosSinTurns(D d, Real<D> turns) {
   return {x * sign, y * sign};
 }
 
+/// 2^x - 1 for 0 <= x < 30, to a few units in the last place even where it is tiny: Taylor polynomial about
+/// the nearest integer (remainder below 1e-8).
+template <class D>
+HWY_INLINE Real<D> Exp2Minus1(D d, Real<D> x) {
+  const IndexTag<D> di;
+  const Real<D> whole = hn::Round(x);
+  const Real<D> f = (x - whole) * Splat(d, std::numbers::ln2);
+  Real<D> y = hn::MulAdd(f, Splat(d, 1.0 / 5040), Splat(d, 1.0 / 720));
+  y = hn::MulAdd(y, f, Splat(d, 1.0 / 120));
+  y = hn::MulAdd(y, f, Splat(d, 1.0 / 24));
+  y = hn::MulAdd(y, f, Splat(d, 1.0 / 6));
+  y = hn::MulAdd(y, f, Splat(d, 0.5));
+  y = hn::MulAdd(y * f, f, f);
+  const Real<D> power = FromIndex(d, hn::Shl(hn::Set(di, 1), ToIndex(d, whole)));
+  return hn::MulAdd(power, y, power - Splat(d, 1));
+}
+
 /// From the sampler's square to [-1, 1]^2, centred on its 2^-24 grid: no coordinate is ever -1, 0 or 1.
 template <class D>
 HWY_INLINE Vec2<D> SignedSquare(D d, const Vec2<D>& u) {

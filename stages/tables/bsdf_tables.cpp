@@ -30,6 +30,20 @@ std::vector<double> HalfTurnCosines(int n) {
   return cosines;
 }
 
+/// log2 of x >= 1 to 1e-9, one bit at a time: squaring doubles the logarithm.
+double Log2(double x) {
+  double result = 0;
+  for (; x >= 2; x /= 2) result += 1;
+  for (double bit = 0.5; bit > 1e-9; bit /= 2) {
+    x *= x;
+    if (x >= 2) {
+      x /= 2;
+      result += bit;
+    }
+  }
+  return result;
+}
+
 /// Sums over the azimuths of one cap height: integrands of A + B and of B.
 struct Ring {
   double all = 0, fresnel = 0;
@@ -129,9 +143,14 @@ BsdfTables Build() {
     }
   }
   for (int i = 0; i < kAverageRoughnesses; ++i) {
-    const AlbedoPair average = Average(tables, NodeRoughness(i, kAverageRoughnesses));
-    tables.average[i * 2] = static_cast<float>(average.m);
-    tables.average[i * 2 + 1] = static_cast<float>(average.b);
+    const double roughness = NodeRoughness(i, kAverageRoughnesses);
+    const AlbedoPair average = Average(tables, roughness);
+    const double alpha = roughness * roughness;
+    float* columns = &tables.average[i * kAverageColumns];
+    columns[0] = static_cast<float>(average.m);
+    columns[1] = static_cast<float>(average.b);
+    columns[2] = static_cast<float>(Log2(1 + 1 / (kSpreadPerAlpha2 * alpha * alpha)));
+    columns[3] = 0;
   }
   return tables;
 }

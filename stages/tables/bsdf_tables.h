@@ -20,6 +20,12 @@ constexpr int kAlbedoCosines = 48;
 constexpr int kAlbedoRoughnesses = 32;   // uniform in roughness from kMinRoughness to 1
 constexpr int kAverageRoughnesses = 63;  // likewise
 
+/// Columns of the table of averages: 2 * integral of mu M, of mu B, the log2 below, and one of padding.
+constexpr int kAverageColumns = 4;
+/// Bounces after the first are sampled with density ~ mu / (mu^2 + b), which follows M when b is about
+/// 2 alpha^2; the third column is log2(1 + 1 / b). Any positive value would be correct.
+constexpr double kSpreadPerAlpha2 = 2;
+
 /// Fixed-point scales: M in [0, 1] in the upper 16 bits, C in [-1, 1] in the lower.
 constexpr double kAlbedoUnitM = 1.0 / 65535;
 constexpr double kAlbedoUnitC = 2.0 / 65535;
@@ -34,12 +40,12 @@ constexpr double kAlbedoResidualGrazing = 0.01;
 /// Borrowed pointers for kernels.
 struct BsdfTablesView {
   const int32_t* albedo = nullptr;  // [roughness][cosine]
-  const float* average = nullptr;   // [roughness][2]: 2 * integral of mu M, of mu B
+  const float* average = nullptr;   // [roughness][kAverageColumns]
 };
 
 struct BsdfTables {
   std::array<int32_t, kAlbedoRoughnesses * kAlbedoCosines> albedo;
-  std::array<float, kAverageRoughnesses * 2> average;
+  std::array<float, kAverageRoughnesses * kAverageColumns> average;
 
   BsdfTablesView View() const { return {albedo.data(), average.data()}; }
 };
