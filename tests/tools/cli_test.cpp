@@ -30,7 +30,7 @@ TEST_F(CliTest, Version) {
 TEST_F(CliTest, WrongCommandLinesAreRefused) {
   const std::string image = folder_ / "out.exr";
   const std::pair<std::vector<std::string>, std::string> cases[] = {
-      {{}, "subcommand"},
+      {{}, "missing a command"},
       {{"paint"}, "paint"},
       {{"info"}, "SCENE"},
       {{"info", scene_, "--bogus"}, "--bogus"},

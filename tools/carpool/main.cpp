@@ -24,6 +24,18 @@ ExitCode Complain(ExitCode code, std::string line) {
   return code;
 }
 
+// What a person did wrong, better than CLI11 says it where no command was recognised.
+std::string UsageLine(const CLI::App& program, const CLI::ParseError& error, int argc,
+                      char** argv) {
+  std::string commands;
+  for (const CLI::App* command : program.get_subcommands({})) {
+    if (command->parsed()) return std::string(error.what()) + "; see carpool --help";
+    commands += (commands.empty() ? "" : ", ") + command->get_name();
+  }
+  const std::string given = argc > 1 ? "'" + std::string(argv[1]) + "' is no" : "missing a";
+  return given + " command; use one of " + commands + ", or --help";
+}
+
 // Parses the arguments and runs the command they name.
 ExitCode Run(CLI::App& program, const std::vector<Command>& commands, int argc, char** argv) {
   try {
@@ -31,7 +43,7 @@ ExitCode Run(CLI::App& program, const std::vector<Command>& commands, int argc, 
   } catch (const CLI::ParseError& error) {
     const bool asked_for_text = error.get_exit_code() == 0;  // --help, --version
     if (asked_for_text) return static_cast<ExitCode>(program.exit(error));
-    return Complain(ExitCode::usage, std::string(error.what()) + "; see carpool --help");
+    return Complain(ExitCode::usage, UsageLine(program, error, argc, argv));
   }
   for (const Command& command : commands) {
     if (command.flags->parsed()) return command.run();
