@@ -1,0 +1,221 @@
+// The same work through six schedulers.
+#include "contestants.h"
+
+#include <algorithm>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include <tbb/blocked_range.h>
+#include <tbb/combinable.h>
+#include <tbb/flow_graph.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
+#include <tbb/task_arena.h>
+#include <tbb/task_group.h>
+
+#include "carpool/carpool.h"
+
+namespace bench {
+namespace {
+
+Result add_up(tbb::combinable<Result>& parts) {
+  return parts.combine([](Result a, const Result& b) {
+    a.sum += b.sum;
+    a.visits += b.visits;
+    return a;
+  });
+}
+
+}  // namespace
+
+Result inlined_loop(const Work& work, const Setup& setup) {
+  tbb::task_arena arena(setup.threads);
+  tbb::combinable<Result> parts;
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, work.items, 512),
+                      [&](const auto& range) {
+                        Result part;
+                        for (std::uint64_t id = range.begin(); id != range.end(); ++id) {
+                          Item item = make_item(work, id);
+                          part.visits += item.left;
+                          while (item.left > 0) {
+                            visit(work, item);
+                          }
+                          part.retire(item);
+                        }
+                        Result& mine = parts.local();
+                        mine.sum += part.sum;
+                        mine.visits += part.visits;
+                      });
+  });
+  return add_up(parts);
+}
+
+Result carpool_run(const Work& work, const Setup& setup) {
+  std::vector<Result> parts(static_cast<std::size_t>(setup.threads));
+  carpool::Graph graph;
+  std::vector<carpool::StageHandle<Item>> stages;
+  for (std::uint32_t s = 0; s < work.stages; ++s) {
+    stages.push_back(
+        graph.add_stage<Item>({.name = "stage", .bins = work.keys, .rank = static_cast<int>(s)}));
+  }
+  for (const auto stage : stages) {
+    graph.set_kernel(stage, [&](const carpool::Batch<Item>& batch, carpool::Emitter& out) {
+      Result& mine = parts[batch.worker];
+      mine.visits += batch.items.size();
+      for (Item item : batch.items) {
+        visit(work, item);
+        if (item.left > 0) {
+          out.emit(stages[stage_of(work, item.hash)], key_of(work, item.hash), item);
+        } else {
+          mine.retire(item);
+        }
+      }
+    });
+  }
+  std::atomic<std::uint64_t> next{0};
+  graph.add_source(
+      {.name = "items", .concurrency = 0}, [&](carpool::SourceContext& ctx, carpool::Emitter& out) {
+        const std::uint64_t first = next.fetch_add(ctx.budget);
+        const std::uint64_t last = std::min(work.items, first + ctx.budget);
+        for (std::uint64_t id = first; id < last; ++id) {
+          const Item item = make_item(work, id);
+          out.emit(stages[stage_of(work, item.hash)], key_of(work, item.hash), item);
+        }
+        return last < work.items ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
+      });
+  carpool::run(
+      graph, {.threads = static_cast<std::uint32_t>(setup.threads), .in_flight = setup.in_flight});
+  Result sum;
+  for (const Result& part : parts) {
+    sum.sum += part.sum;
+    sum.visits += part.visits;
+  }
+  return sum;
+}
+
+// A parallel_for per hop over 4k items, no keys: the strongest simple rival.
+Result waves(const Work& work, const Setup& setup) {
+  constexpr std::uint64_t kWave = 4096;
+  tbb::task_arena arena(setup.threads);
+  tbb::combinable<Result> parts;
+  arena.execute([&] {
+    std::vector<Item> items;
+    for (std::uint64_t first = 0; first < work.items; first += kWave) {
+      items.clear();
+      for (std::uint64_t id = first; id < std::min(work.items, first + kWave); ++id) {
+        items.push_back(make_item(work, id));
+      }
+      while (!items.empty()) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, items.size(), 256),
+                          [&](const auto& range) {
+                            Result part;
+                            for (std::size_t i = range.begin(); i != range.end(); ++i) {
+                              visit(work, items[i]);
+                              ++part.visits;
+                              if (items[i].left == 0) {
+                                part.retire(items[i]);
+                              }
+                            }
+                            Result& mine = parts.local();
+                            mine.sum += part.sum;
+                            mine.visits += part.visits;
+                          });
+        std::erase_if(items, [](const Item& item) { return item.left == 0; });
+      }
+    }
+  });
+  return add_up(parts);
+}
+
+Result flow_graph(const Work& work, const Setup& setup) {
+  using Node = tbb::flow::function_node<Item, tbb::flow::continue_msg>;
+  tbb::task_arena arena(setup.threads);
+  tbb::combinable<Result> parts;
+  arena.execute([&] {
+    tbb::flow::graph graph;
+    std::vector<std::unique_ptr<Node>> nodes;
+    for (std::uint32_t s = 0; s < work.stages; ++s) {
+      nodes.push_back(std::make_unique<Node>(graph, tbb::flow::unlimited, [&](Item item) {
+        Result& mine = parts.local();
+        visit(work, item);
+        ++mine.visits;
+        if (item.left > 0) {
+          nodes[stage_of(work, item.hash)]->try_put(item);
+        } else {
+          mine.retire(item);
+        }
+      }));
+    }
+    for (std::uint64_t first = 0; first < work.items; first += setup.in_flight) {
+      for (std::uint64_t id = first; id < std::min(work.items, first + setup.in_flight); ++id) {
+        const Item item = make_item(work, id);
+        nodes[stage_of(work, item.hash)]->try_put(item);
+      }
+      graph.wait_for_all();
+    }
+  });
+  return add_up(parts);
+}
+
+Result feeder(const Work& work, const Setup& setup) {
+  tbb::task_arena arena(setup.threads);
+  tbb::combinable<Result> parts;
+  arena.execute([&] {
+    std::vector<Item> items;
+    for (std::uint64_t first = 0; first < work.items; first += setup.in_flight) {
+      items.clear();
+      for (std::uint64_t id = first; id < std::min(work.items, first + setup.in_flight); ++id) {
+        items.push_back(make_item(work, id));
+      }
+      tbb::parallel_for_each(items.begin(), items.end(),
+                             [&](const Item& from, tbb::feeder<Item>& out) {
+                               Item item = from;
+                               Result& mine = parts.local();
+                               visit(work, item);
+                               ++mine.visits;
+                               if (item.left > 0) {
+                                 out.add(item);
+                               } else {
+                                 mine.retire(item);
+                               }
+                             });
+    }
+  });
+  return add_up(parts);
+}
+
+Result task_group(const Work& work, const Setup& setup) {
+  tbb::task_arena arena(setup.threads);
+  tbb::combinable<Result> parts;
+  arena.execute([&] {
+    tbb::task_group group;
+    struct Hop {
+      const Work& work;
+      tbb::combinable<Result>& parts;
+      tbb::task_group& group;
+      Item item;
+      void operator()() const {
+        Item next = item;
+        Result& mine = parts.local();
+        visit(work, next);
+        ++mine.visits;
+        if (next.left > 0) {
+          group.run(Hop{work, parts, group, next});
+        } else {
+          mine.retire(next);
+        }
+      }
+    };
+    for (std::uint64_t first = 0; first < work.items; first += setup.in_flight) {
+      for (std::uint64_t id = first; id < std::min(work.items, first + setup.in_flight); ++id) {
+        group.run(Hop{work, parts, group, make_item(work, id)});
+      }
+      group.wait();
+    }
+  });
+  return add_up(parts);
+}
+
+}  // namespace bench
