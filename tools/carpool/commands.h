@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "render/base/error.h"
 
@@ -17,6 +18,9 @@ struct Command {
   CLI::App* flags;
   std::function<render::ExitCode()> run;
 };
+
+/// Warn prints a warning on standard error.
+void Warn(const std::string& line);
 
 Command RenderCommand(CLI::App& program);
 Command PlanCommand(CLI::App& program);

@@ -18,9 +18,7 @@ struct InfoFlags {
 
 render::ExitCode Info(const InfoFlags& flags) {
   render::LoadOptions options = flags.load;
-  options.warn = [](const std::string& line) {
-    std::fprintf(stderr, "carpool: warning: %s\n", line.c_str());
-  };
+  options.warn = Warn;
   const render::ImportedScene scene = render::LoadGltf(flags.scene_path, options);
   const std::string text = flags.json ? DescribeSceneJson(scene) : DescribeScene(scene);
   std::fputs(text.c_str(), stdout);

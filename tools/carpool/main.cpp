@@ -55,13 +55,19 @@ ExitCode Main(int argc, char** argv) {
   CLI::App program("A progressive path tracer for glTF 2.0 scenes.", "carpool");
   program.set_version_flag("--version", "carpool " CARPOOL_VERSION);
   program.require_subcommand(1);
-  const std::vector<Command> commands = {InfoCommand(program)};
+  const std::vector<Command> commands = {RenderCommand(program), PlanCommand(program),
+                                         InfoCommand(program)};
   const ExitCode code = Run(program, commands, argc, argv);
   if (std::fflush(stdout) != 0) throw render::OutputError("standard output", "cannot be written");
   return code;
 }
 
 }  // namespace
+
+void Warn(const std::string& line) {
+  std::fprintf(stderr, "carpool: warning: %s\n", line.c_str());
+}
+
 }  // namespace carpool::tools
 
 int main(int argc, char** argv) {

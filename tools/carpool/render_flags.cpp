@@ -62,6 +62,12 @@ void AddSceneFlags(CLI::App& command, RenderFlags& flags) {
       .add_option("--depth", s.max_depth,
                   "scattering vertices of a path (default: 8); 0 emission, 1 direct light")
       ->type_name("N");
+  command
+      .add_option("--executor", flags.executor,
+                  "wavefront, megakernel or auto (default); the image is the same")
+      ->type_name("NAME");
+  command.add_flag("--no-robust", flags.no_robust,
+                   "faster rays that may slip through where triangles meet");
 }
 
 void AddRunFlags(CLI::App& command, RenderFlags& flags) {
@@ -82,17 +88,11 @@ void AddRunFlags(CLI::App& command, RenderFlags& flags) {
   command.add_option("--batch", s.batch_items, "items per batch (default: by stage)")
       ->type_name("N");
   command
-      .add_option("--executor", flags.executor,
-                  "wavefront, megakernel or auto (default); the image is the same")
-      ->type_name("NAME");
-  command
       .add_option("--policy", flags.policy,
                   "which batch is next: deepest (default), fullest or oldest")
       ->type_name("NAME");
   command.add_option("--isa", flags.isa, "instruction set: sse4, avx2, avx512 or auto (default)")
       ->type_name("NAME");
-  command.add_flag("--no-robust", flags.no_robust,
-                   "faster rays that may slip through where triangles meet");
   command.add_option("--stats", s.stats_path, "the run's report as JSON")->type_name("FILE.json");
   command.add_flag("--quiet", s.quiet, "say nothing but errors");
 }

@@ -21,7 +21,7 @@ struct RenderFlags {
   bool no_png = false, no_robust = false;
 };
 
-/// AddSceneFlags adds what decides which work a render has: scene, view, image, length.
+/// AddSceneFlags adds what decides which work a render has: scene, view, image, length, executor.
 void AddSceneFlags(CLI::App& command, RenderFlags& flags);
 
 /// AddRunFlags adds the rest: where results go, and how the machine is used.
