@@ -21,11 +21,14 @@ HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
 namespace lights {
 
-/// A place on the map in texels: texel centres are at integers, `s` is in [-1/2, width - 1/2] and `t` in
-/// [-1/2, height - 1/2]; `sin_theta` belongs to the direction and is kept because it is exact there.
+/// A place on the map: texel centres are at integers, the place at (i + fs, j + ft) with fs, ft in [0, 1],
+/// i in [0, width) and j in [-1, height). `sin_theta` belongs to the direction and is kept because it is
+/// more exact than what the place gives near the poles.
 template <class D>
 struct EnvironmentPlace {
-  Real<D> s, t, sin_theta;
+  Int<D> i, j;
+  Real<D> fs, ft;
+  Real<D> sin_theta;
 };
 
 template <class D>
@@ -47,17 +50,6 @@ struct EnvironmentTaps {
   Real<D> w00, w10, w01, w11;
 };
 
-template <class D>
-HWY_INLINE EnvironmentPlace<D> PlaceOfDirection(D d, const EnvironmentView& view,
-                                                const Vec3<D>& dir) {
-  const Real<D> half = Splat(d, 0.5);
-  const Real<D> sin_theta = SafeSqrt(d, hn::MulAdd(dir.x, dir.x, dir.z * dir.z));
-  const Real<D> u = hn::MulAdd(Atan2(d, dir.x, hn::Neg(dir.z)), Splat(d, 0.5 / kPi), half);
-  const Real<D> v = Atan2(d, sin_theta, dir.y) * Splat(d, 1 / kPi);
-  return {hn::MulSub(u, Splat(d, view.width), half), hn::MulSub(v, Splat(d, view.height), half),
-          sin_theta};
-}
-
 /// floor(x) as an integer, and what is left of x.
 template <class D>
 HWY_INLINE Int<D> SplitFloor(D, Real<D> x, Real<D>& fraction) {
@@ -70,25 +62,43 @@ HWY_INLINE Int<D> ClampIndex(D, Int<D> index, int32_t count) {
   const IntTag<D> di;
   return hn::Min(hn::Max(index, hn::Zero(di)), hn::Set(di, count - 1));
 }
+/// Column -1 is the last one; the clamp is for directions that are no numbers.
+template <class D>
+HWY_INLINE Int<D> WrapColumn(D d, Int<D> i, int32_t width) {
+  const IntTag<D> di;
+  const Int<D> wrapped = hn::IfThenElse(hn::Lt(i, hn::Zero(di)), i + hn::Set(di, width), i);
+  return ClampIndex(d, wrapped, width);
+}
+
+template <class D>
+HWY_INLINE EnvironmentPlace<D> PlaceOfDirection(D d, const EnvironmentView& view,
+                                                const Vec3<D>& dir) {
+  const Real<D> half = Splat(d, 0.5);
+  EnvironmentPlace<D> place;
+  place.sin_theta = SafeSqrt(d, hn::MulAdd(dir.x, dir.x, dir.z * dir.z));
+  const Real<D> u = hn::MulAdd(AngleOf(d, dir.x, hn::Neg(dir.z)), Splat(d, 0.5 / kPi), half);
+  const Real<D> v = AngleOf(d, place.sin_theta, dir.y) * Splat(d, 1 / kPi);
+  const Int<D> i = SplitFloor(d, hn::MulSub(u, Splat(d, view.width), half), place.fs);
+  place.i = WrapColumn(d, i, view.width);
+  place.j = SplitFloor(d, hn::MulSub(v, Splat(d, view.height), half), place.ft);
+  return place;
+}
 
 template <class D>
 HWY_INLINE EnvironmentTaps<D> TapsAt(D d, const EnvironmentView& view,
                                      const EnvironmentPlace<D>& place) {
   const IntTag<D> di;
   const Int<D> one = hn::Set(di, 1), width = hn::Set(di, view.width);
-  Real<D> fs, ft;
-  Int<D> i = SplitFloor(d, place.s, fs), j = SplitFloor(d, place.t, ft);
-
-  i = hn::IfThenElse(hn::Lt(i, hn::Zero(di)), i + width, i);
-  i = ClampIndex(d, i, view.width);  // wrapped already; the clamp is for NaN directions
-  const Int<D> next = i + one;
+  const Int<D> next = place.i + one;
   const Int<D> i1 = hn::IfThenElseZero(hn::Lt(next, width), next);
-  const Int<D> row0 = ClampIndex(d, j, view.height) * width;
-  const Int<D> row1 = ClampIndex(d, j + one, view.height) * width;
+  const Int<D> row0 = ClampIndex(d, place.j, view.height) * width;
+  const Int<D> row1 = ClampIndex(d, place.j + one, view.height) * width;
 
+  const Real<D> fs = place.fs, ft = place.ft;
   const Real<D> gs = Splat(d, 1) - fs, gt = Splat(d, 1) - ft;
-  return {hn::ShiftLeft<2>(row0 + i),  hn::ShiftLeft<2>(row0 + i1), hn::ShiftLeft<2>(row1 + i),
-          hn::ShiftLeft<2>(row1 + i1), gs * gt, fs * gt, gs * ft, fs * ft};
+  return {hn::ShiftLeft<2>(row0 + place.i),  hn::ShiftLeft<2>(row0 + i1),
+          hn::ShiftLeft<2>(row1 + place.i),  hn::ShiftLeft<2>(row1 + i1),
+          gs * gt, fs * gt, gs * ft, fs * ft};
 }
 
 /// The bilinear value of channel 0..3 of the texels.
@@ -185,38 +195,58 @@ HWY_INLINE Real<D> SampleTent(D d, Real<D> u) {
   return hn::IfThenElse(rising, root - one, one - root);
 }
 
+/// A place under the tent of `texel`: the texel before the place, and how far it is behind it. Kept apart,
+/// because their sum would round a place near the edge of the tent onto it, where the density is 0.
+template <class D>
+HWY_INLINE Int<D> PlaceUnderTent(D d, const TableEntry<D>& texel, Real<D>& fraction) {
+  const IntTag<D> di;
+  const Real<D> offset = SampleTent(d, texel.within);
+  const Mask<D> before = hn::Lt(offset, hn::Zero(d));
+  fraction = hn::IfThenElse(before, offset + Splat(d, 1), offset);
+  return hn::IfThenElse(ToIntMask(d, before), texel.index - hn::Set(di, 1), texel.index);
+}
+
+/// Distance in rows to the nearer pole, from that side, so that its sine keeps its relative precision.
+template <class D>
+HWY_INLINE Real<D> RowsFromPole(D d, const EnvironmentView& view, const EnvironmentPlace<D>& place) {
+  const Int<D> below = hn::Set(IntTag<D>(), view.height - 1) - place.j;
+  const Real<D> north = hn::ConvertTo(d, place.j) + Splat(d, 0.5) + place.ft;
+  const Real<D> south = hn::ConvertTo(d, below) + (Splat(d, 0.5) - place.ft);
+  return hn::Max(hn::Min(north, south), hn::Zero(d));
+}
+
 /// A place with the density described above: tents are wrapped in s and reflected at the poles, which is
 /// what wrapping and clamping make of bilinear interpolation.
 template <class D>
 HWY_INLINE EnvironmentPlace<D> SamplePlace(D d, const EnvironmentView& view, const Vec2<D>& u) {
   const IntTag<D> di;
-  const TableEntry<D> row =
-      InvertTable(d, view.row_cdf, hn::Zero(di), view.height, u.y);
+  const TableEntry<D> row = InvertTable(d, view.row_cdf, hn::Zero(di), view.height, u.y);
   const TableEntry<D> column =
       InvertTable(d, view.column_cdf, row.index * hn::Set(di, view.width), view.width, u.x);
-  Real<D> s = hn::ConvertTo(d, column.index) + SampleTent(d, column.within);
-  Real<D> t = hn::ConvertTo(d, row.index) + SampleTent(d, row.within);
+  EnvironmentPlace<D> place;
+  place.i = WrapColumn(d, PlaceUnderTent(d, column, place.fs), view.width);
+  place.j = PlaceUnderTent(d, row, place.ft);
 
-  const Real<D> first = Splat(d, -0.5), width = Splat(d, view.width);
-  const Real<D> last = Splat(d, view.height - 0.5);
-  s = hn::IfThenElse(hn::Lt(s, first), s + width, s);
-  s = hn::IfThenElse(hn::Lt(s, width + first), s, s - width);
-  t = hn::IfThenElse(hn::Lt(t, first), Splat(d, -1) - t, t);
-  t = hn::IfThenElse(hn::Gt(t, last), last + last - t, t);
-  t = hn::Min(hn::Max(t, first), last);
-  // From the nearer pole, so that the sine keeps its relative precision there.
-  const Real<D> from_pole = hn::Min(t - first, last - t) * Splat(d, kPi / view.height);
-  return {s, t, hn::Sin(d, from_pole)};
+  const Real<D> half = Splat(d, 0.5);
+  const Mask<D> north = ToMask(d, hn::Lt(place.j, hn::Zero(di)));
+  const Mask<D> south = ToMask(d, hn::Eq(place.j, hn::Set(di, view.height - 1)));
+  const Mask<D> beyond = hn::Or(hn::And(north, hn::Lt(place.ft, half)),
+                                hn::And(south, hn::Gt(place.ft, half)));
+  place.ft = hn::IfThenElse(beyond, Splat(d, 1) - place.ft, place.ft);
+  place.sin_theta = hn::Sin(d, RowsFromPole(d, view, place) * Splat(d, kPi / view.height));
+  return place;
 }
 
 template <class D>
 HWY_INLINE Vec3<D> DirectionOfPlace(D d, const EnvironmentView& view,
                                     const EnvironmentPlace<D>& place) {
-  const Real<D> middle = Splat(d, 0.5 * view.width - 0.5);
-  const Real<D> phi = (place.s - middle) * Splat(d, 2 * kPi / view.width);
-  const Real<D> equator = Splat(d, 0.5 * view.height - 0.5);
-  const Real<D> elevation = (equator - place.t) * Splat(d, kPi / view.height);
-  return {place.sin_theta * hn::Sin(d, phi), hn::Sin(d, elevation),
+  const auto angle = [&](Int<D> whole, Real<D> fraction, int32_t count, double circle) HWY_ATTR {
+    const Real<D> from_middle = hn::ConvertTo(d, whole) - Splat(d, 0.5 * count - 0.5);
+    return (from_middle + fraction) * Splat(d, circle / count);
+  };
+  const Real<D> phi = angle(place.i, place.fs, view.width, 2 * kPi);
+  const Real<D> depression = angle(place.j, place.ft, view.height, kPi);
+  return {place.sin_theta * hn::Sin(d, phi), hn::Neg(hn::Sin(d, depression)),
           hn::Neg(place.sin_theta * hn::Cos(d, phi))};
 }
 

@@ -19,9 +19,10 @@ namespace lights {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kLargestBelowOne = 0.999999940395355224609375;  // 1 - 2^-24, in float
 
-/// Angle of the vector (x, y) in [-pi, pi]; (0, 0) gives 0. Error below 4e-7.
+/// Angle of the vector (x, y) in [-pi, pi]; (0, 0) gives 0. Error below 4e-7. Not named Atan2: newer
+/// Highways have one, which argument-dependent lookup would find too.
 template <class D>
-HWY_INLINE Real<D> Atan2(D d, Real<D> y, Real<D> x) {
+HWY_INLINE Real<D> AngleOf(D d, Real<D> y, Real<D> x) {
   const Real<D> ax = hn::Abs(x), ay = hn::Abs(y);
   const Real<D> ratio = SafeDiv(d, hn::Min(ax, ay), hn::Max(ax, ay));
   const Real<D> first_octant = hn::Atan(d, ratio);

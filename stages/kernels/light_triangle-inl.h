@@ -87,7 +87,7 @@ HWY_INLINE SphericalTriangle<D> SeenFrom(D d, const Vec3<D>& p0, const Vec3<D>& 
   t.volume = hn::Abs(t.triple * r0 * r1 * r2);
 
   const Real<D> d01 = Dot(t.a, t.b), d12 = Dot(t.b, t.c), d20 = Dot(t.c, t.a);
-  t.solid_angle = Splat(d, 2) * Atan2(d, t.volume, one + d01 + d12 + d20);
+  t.solid_angle = Splat(d, 2) * AngleOf(d, t.volume, one + d01 + d12 + d20);
   PutLongestArcFirst<D>(d01, d12, d20, t.a, t.b, t.c);
   const Vec3<D> sum = Add(t.a, t.b);
   t.one_plus_ab = Splat(d, 0.5) * Dot(sum, sum);
