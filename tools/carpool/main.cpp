@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "carpool/version.h"
 #include "render/base/error.h"
 #include "tools/carpool/commands.h"
 
