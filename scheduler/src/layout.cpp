@@ -2,6 +2,7 @@
 #include "layout.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -22,16 +23,9 @@ std::uint64_t round_up_to_line(std::uint64_t bytes) {
   return (bytes + kLine - 1) / kLine * kLine;
 }
 
-// A ladder of sizes: one cache line, times four, ..., the full block. The last step may be up to
-// eight-fold, which spares a size that hardly differs from the full one.
-std::vector<std::uint32_t> ladder(std::uint32_t item_bytes, std::uint32_t block_items) {
-  const std::uint64_t full = round_up_to_line(std::uint64_t{item_bytes} * block_items);
-  std::vector<std::uint32_t> sizes;
-  for (std::uint64_t bytes = round_up_to_line(item_bytes); bytes * 2 <= full; bytes *= 4) {
-    sizes.push_back(static_cast<std::uint32_t>(bytes));
-  }
-  sizes.push_back(static_cast<std::uint32_t>(full));
-  return sizes;
+std::uint32_t grade_of(std::uint32_t least_items) {
+  const auto log2 = static_cast<std::uint32_t>(std::bit_width(least_items) - 1);
+  return std::min(log2 / 2, kGrades - 1);
 }
 
 }  // namespace
@@ -106,7 +100,14 @@ void Layout::order_by_rank(const Graph& graph) {
 }
 
 void Layout::build_levels(const Graph& graph, const RunOptions& options) {
-  std::vector<std::vector<std::uint32_t>> ladders;
+  std::uint64_t largest_item = 1;
+  for (const Graph::Stage& from : graph.stages()) {
+    largest_item = std::max<std::uint64_t>(largest_item, from.item_bytes);
+  }
+  // Small first blocks save memory where bins are many. As long as one block for every bin and
+  // worker costs no more than a quarter of what the items in flight do, larger ones save copies.
+  const std::uint64_t budget = std::max<std::uint64_t>(65536, in_flight * largest_item / 4);
+  const std::uint64_t thrift = budget / (std::uint64_t{slots} * workers);
   std::vector<std::uint32_t> sizes{kLine};  // ReadyBlocks come from the pool, too
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const Graph::Stage& from = graph.stages()[i];
@@ -125,8 +126,10 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
       throw std::invalid_argument("carpool: a block of stage '" + from.options.name +
                                   "' is larger than 64 MiB; lower its block_items");
     }
-    ladders.push_back(ladder(stage.item_bytes, stage.block_items));
-    sizes.insert(sizes.end(), ladders.back().begin(), ladders.back().end());
+    build_ladder(stage, thrift);
+    for (std::uint32_t level = 0; level <= stage.top_level; ++level) {
+      sizes.push_back(stage.levels[level].bytes);
+    }
   }
   std::sort(sizes.begin(), sizes.end());
   sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
@@ -134,22 +137,34 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
     classes.push_back({.bytes = bytes, .cache = std::clamp(16384U / bytes, 2U, 64U), .limit = 0});
   }
   node_class = class_of(kLine);
-  for (std::size_t i = 0; i < stages.size(); ++i) {
-    StageLayout& stage = stages[i];
-    stage.top_level = static_cast<std::uint8_t>(ladders[i].size() - 1);
-    // Small steps save memory where bins are many. Where one block of a size for every bin and
-    // worker costs no more than a quarter of what the items in flight do, beginning at that size
-    // saves copies.
-    const std::uint64_t thrift = std::max<std::uint64_t>(65536, in_flight * stage.item_bytes / 4);
-    for (std::uint8_t level = 0; level <= stage.top_level; ++level) {
-      const std::uint32_t bytes = ladders[i][level];
-      stage.levels[level] = {.pool_class = class_of(bytes),
-                             .bytes = bytes,
-                             .items = std::min(bytes / stage.item_bytes, stage.block_items)};
-      if (std::uint64_t{bytes} * stage.bins * workers <= thrift) {
-        stage.start_level = level;
-      }
+  for (StageLayout& stage : stages) {
+    for (std::uint32_t level = 0; level <= stage.top_level; ++level) {
+      stage.levels[level].pool_class = class_of(stage.levels[level].bytes);
     }
+  }
+}
+
+// From what fits one cache line, though at most four items, in steps of four to the full block.
+void Layout::build_ladder(StageLayout& stage, std::uint64_t thrift) const {
+  const std::uint64_t full = round_up_to_line(std::uint64_t{stage.item_bytes} * stage.block_items);
+  const std::uint64_t smallest = std::min(full, thrift / kLine * kLine);
+  std::uint64_t items = std::clamp<std::uint64_t>(kLine / stage.item_bytes, 1, 4);
+  std::uint32_t least = 1;
+  for (std::uint32_t level = 0; level < kMaxLevels; ++level) {
+    if (items * 2 > stage.block_items || level + 1 == kMaxLevels) {
+      items = stage.block_items;  // a step of two at the end is not worth a size of its own
+    }
+    const std::uint64_t bytes = std::max(smallest, round_up_to_line(items * stage.item_bytes));
+    stage.levels[level] = {.items = static_cast<std::uint32_t>(items),
+                           .bytes = static_cast<std::uint32_t>(bytes),
+                           .pool_class = 0,
+                           .grade = grade_of(least)};
+    stage.top_level = static_cast<std::uint8_t>(level);
+    if (items == stage.block_items) {
+      return;
+    }
+    least = static_cast<std::uint32_t>(items) + 1;
+    items *= 4;
   }
 }
 
@@ -172,17 +187,20 @@ void Layout::limit_classes() {
     std::uint64_t full = 0;              // full blocks of this size
     bool used = false;
     for (const StageLayout& stage : stages) {
-      for (std::uint8_t level = stage.start_level; level <= stage.top_level; ++level) {
-        if (stage.levels[level].pool_class != c) {
-          continue;
+      std::uint64_t least = 0;
+      for (std::uint32_t level = stage.top_level + 1U; level-- > 0;) {
+        if (stage.levels[level].pool_class == c) {
+          least = level == 0 ? 1 : stage.levels[level - 1].items + 1;
         }
-        used = true;
-        bins += stage.bins;
-        fewest = std::min<std::uint64_t>(
-            fewest, level == stage.start_level ? 1 : stage.levels[level - 1].items + 1);
-        if (level == stage.top_level) {
-          full = std::max(full, in_flight / stage.block_items);
-        }
+      }
+      if (least == 0) {
+        continue;  // no block of this stage is of that size
+      }
+      used = true;
+      bins += stage.bins;
+      fewest = std::min(fewest, least);
+      if (stage.levels[stage.top_level].pool_class == c) {
+        full = std::max(full, in_flight / stage.block_items);
       }
     }
     if (used) {

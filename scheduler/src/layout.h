@@ -12,15 +12,17 @@
 namespace carpool {
 
 inline constexpr std::uint32_t kMaxLevels = 16;
-inline constexpr std::uint32_t kGrades = 3;  // see OpenTable
+inline constexpr std::uint32_t kGrades = 6;  // see OpenTable
 inline constexpr std::uint32_t kPartialsPerWorker =
     16;  // published partial blocks a worker may have out
 
-// BlockLevel is one size of block in a stage's ladder of sizes.
+// BlockLevel is one step of an open block on its way from empty to full. Going up a level may mean
+// a larger block, or only that it is noted how much fuller this one is.
 struct BlockLevel {
-  std::uint32_t pool_class = 0;
-  std::uint32_t bytes = 0;
-  std::uint32_t items = 0;
+  std::uint32_t items = 0;       // when it has so many it goes up
+  std::uint32_t bytes = 0;       // size of its memory
+  std::uint32_t pool_class = 0;  // where that comes from
+  std::uint32_t grade = 0;       // how full it is, as a power of four
 };
 
 struct StageLayout {
@@ -34,7 +36,6 @@ struct StageLayout {
   std::uint32_t rank_lane = 0;  // 0 for the highest rank
   int rank = 0;
   FlushCause full_cause = FlushCause::full;
-  std::uint8_t start_level = 0;
   std::uint8_t top_level = 0;
   std::array<BlockLevel, kMaxLevels> levels{};
 };
@@ -68,6 +69,7 @@ struct Layout {
   void set_weights(const Graph& graph);
   void order_by_rank(const Graph& graph);
   void build_levels(const Graph& graph, const RunOptions& options);
+  void build_ladder(StageLayout& stage, std::uint64_t thrift) const;
   void limit_classes();
   std::uint32_t class_of(std::uint32_t bytes) const;
 };

@@ -40,7 +40,7 @@ void OpenTable::make_room(std::uint32_t stage_index, std::uint32_t bin) {
   if (slot.begin == nullptr) {
     open(stage, bin);
   } else if (slot.level < stage.top_level) {
-    grow(stage, bin);
+    go_up(stage, bin);
   } else {
     sink_.publish(remove(stage.first_bit + bin), stage.full_cause);
     open(stage, bin);
@@ -49,37 +49,37 @@ void OpenTable::make_room(std::uint32_t stage_index, std::uint32_t bin) {
 
 void OpenTable::open(const StageLayout& stage, std::uint32_t bin) {
   const std::uint32_t index = stage.first_slot + bin;
-  const BlockLevel& level = stage.levels[stage.start_level];
+  const BlockLevel& level = stage.levels[0];
   std::byte* data = cache_.allocate(level.pool_class);  // may throw: the slot is still empty then
   table_[index] = {.write = data,
                    .end = data + std::size_t{level.items} * stage.item_bytes,
                    .begin = data,
-                   .level = stage.start_level};
-  grades_[grade(stage, stage.start_level)].set(stage.first_bit + bin);
+                   .level = 0};
+  grades_[level.grade].set(stage.first_bit + bin);
   ++count_;
   if (layout_.track_age) {
     link(index);
   }
 }
 
-void OpenTable::grow(const StageLayout& stage, std::uint32_t bin) {
+void OpenTable::go_up(const StageLayout& stage, std::uint32_t bin) {
   detail::OpenSlot& slot = table_[stage.first_slot + bin];
   const BlockLevel& from = stage.levels[slot.level];
   const BlockLevel& to = stage.levels[slot.level + 1];
-  std::byte* data = cache_.allocate(to.pool_class);  // may throw: the slot is still as it was then
-  const std::size_t used = static_cast<std::size_t>(slot.write - slot.begin);
-  std::memcpy(data, slot.begin, used);
-  cache_.release(from.pool_class, slot.begin);
-  const std::uint32_t old_grade = grade(stage, slot.level);
-  const std::uint32_t new_grade = grade(stage, slot.level + 1);
-  if (old_grade != new_grade) {
-    grades_[old_grade].clear(stage.first_bit + bin);
-    grades_[new_grade].set(stage.first_bit + bin);
+  if (from.pool_class != to.pool_class) {
+    std::byte* data = cache_.allocate(to.pool_class);  // may throw: the slot is as it was then
+    const std::size_t used = static_cast<std::size_t>(slot.write - slot.begin);
+    std::memcpy(data, slot.begin, used);
+    cache_.release(from.pool_class, slot.begin);
+    slot.begin = data;
+    slot.write = data + used;
   }
-  slot = {.write = data + used,
-          .end = data + std::size_t{to.items} * stage.item_bytes,
-          .begin = data,
-          .level = slot.level + 1};
+  if (from.grade != to.grade) {
+    grades_[from.grade].clear(stage.first_bit + bin);
+    grades_[to.grade].set(stage.first_bit + bin);
+  }
+  slot.end = slot.begin + std::size_t{to.items} * stage.item_bytes;
+  ++slot.level;
 }
 
 Block OpenTable::remove(std::uint32_t bit) {
@@ -93,7 +93,7 @@ Block OpenTable::remove(std::uint32_t bit) {
                     .stage = stage_index,
                     .bin = bin,
                     .level = static_cast<std::uint8_t>(slot.level)};
-  grades_[grade(stage, slot.level)].clear(bit);
+  grades_[stage.levels[slot.level].grade].clear(bit);
   slot = {};
   --count_;
   if (layout_.track_age) {

@@ -26,9 +26,10 @@ class BlockSink {
 
 // OpenTable keeps, for each (stage, bin), the block that this worker is filling.
 //
-// Blocks are kept in bitmaps by grade: 0 while they are one cache line, 1 while they are smaller
-// than a quarter of a full block, 2 above. So the fullest and the deepest are found without a scan.
-// Bits are in order of rank. Owned and used by one worker.
+// Blocks are kept in bitmaps by grade, which is how full they are on a scale of powers of four.
+// So the fullest and the deepest are found without a scan. Bits are in order of rank. A block
+// changes its grade in the slow path of emit, which `OpenSlot::end` triggers also where there is
+// memory left. Owned and used by one worker.
 class OpenTable final : public Emitter {
  public:
   OpenTable(const Layout& layout, const Policy& policy, BlockCache& cache, BlockSink& sink);
@@ -69,14 +70,11 @@ class OpenTable final : public Emitter {
 
   void make_room(std::uint32_t stage, std::uint32_t bin) override;
   void open(const StageLayout& stage, std::uint32_t bin);
-  void grow(const StageLayout& stage, std::uint32_t bin);
+  void go_up(const StageLayout& stage, std::uint32_t bin);
   Block remove(std::uint32_t bit);
   std::uint32_t choose();
   std::uint32_t choose_by_lane_function();
 
-  static std::uint32_t grade(const StageLayout& stage, std::uint32_t level) {
-    return level == stage.top_level ? 2 : level == 0 ? 0 : 1;
-  }
   void link(std::uint32_t slot);
   void unlink(std::uint32_t slot);
 

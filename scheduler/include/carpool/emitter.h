@@ -17,10 +17,9 @@ namespace detail {
 // makes the first emit take the slow path without a test of its own.
 struct OpenSlot {
   std::byte* write = nullptr;  // where the next item goes
-  std::byte* end = nullptr;    // behind the last item that fits
+  std::byte* end = nullptr;    // where the slow path is due: full, or much fuller than before
   std::byte* begin = nullptr;  // the block
-  std::uint32_t level = 0;     // how often it has grown
-  std::uint32_t opened = 0;    // unused by the fast path; see OpenTable
+  std::uint32_t level = 0;     // how far it has come; see Layout
 };
 
 [[noreturn]] void throw_bad_bin(std::uint32_t stage, std::uint32_t bin, std::uint32_t bins);
