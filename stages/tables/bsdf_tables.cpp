@@ -130,7 +130,7 @@ AlbedoPair Average(const BsdfTables& tables, double roughness) {
 }
 
 BsdfTables Build() {
-  constexpr int kHeights = 64;
+  constexpr int kHeights = 40;
   constexpr int kAzimuths = 32;
   const std::vector<double> cosines = HalfTurnCosines(kAzimuths);
   BsdfTables tables;
