@@ -183,7 +183,8 @@ HWY_INLINE TableEntry<D> InvertTable(D d, const int32_t* HWY_RESTRICT table, Int
   const Int<D> mass = cumulative(index + hn::Set(di, 1)) - low;
   // The middle of u's cell, so that an entry of a single cell is met at its centre.
   const Real<D> offset = hn::ConvertTo(d, cell - low) + Splat(d, 0.5);
-  return {index, SafeDiv(d, offset, hn::ConvertTo(d, mass))};
+  const Real<D> within = SafeDiv(d, offset, hn::ConvertTo(d, mass));
+  return {index, hn::Min(within, Splat(d, kLargestBelowOne))};
 }
 
 /// Inverts the triangle distribution on (-1, 1), monotonically.
