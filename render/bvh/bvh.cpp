@@ -2,6 +2,7 @@
 #include "render/bvh/bvh.h"
 
 #include <atomic>
+#include <chrono>
 #include <map>
 #include <stdexcept>
 
@@ -69,9 +70,11 @@ bool Bvh::CountMemory(void* self, ssize_t bytes, bool) {
 Bvh::Bvh(SceneTables& scene, const PlacementPlan& plan, const BvhOptions& options)
     : device_(rtcNewDevice(DeviceConfig(options.isa).c_str())) {
   if (!device_) ThrowEmbree(nullptr, "starting");
+  const auto begin = std::chrono::steady_clock::now();
   rtcSetDeviceMemoryMonitorFunction(device_.get(), &CountMemory, this);
   BuildLevel(opaque_, scene, plan, false, options.robust);
   BuildLevel(transparent_, scene, plan, true, options.robust);
+  seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
 Bvh::~Bvh() {

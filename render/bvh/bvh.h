@@ -32,7 +32,8 @@ class Bvh {
   Bvh& operator=(const Bvh&) = delete;
 
   stages::TraceView View() const;
-  uint64_t bytes() const { return bytes_; }  // what Embree holds now
+  uint64_t bytes() const { return bytes_; }    // what Embree holds now
+  double seconds() const { return seconds_; }  // that building took
 
  private:
   struct Level {
@@ -48,6 +49,7 @@ class Bvh {
   static bool CountMemory(void* self, ssize_t bytes, bool post);
 
   uint64_t bytes_ = 0;
+  double seconds_ = 0;
   DevicePtr device_;
   Level opaque_, transparent_;
 };

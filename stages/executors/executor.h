@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include <tbb/task_arena.h>
@@ -50,6 +51,9 @@ class Executor {
  public:
   virtual ~Executor() = default;
   virtual std::string_view name() const = 0;
+
+  /// The stage graph in Graphviz's language; empty for executors without one.
+  virtual std::string Dot() const = 0;
 
   /// Renders one pass. `stop` ends it early: no new camera rays, what is in flight comes to its end.
   /// `progress`, if set, is called now and then by some worker with the fraction done.

@@ -21,6 +21,7 @@ class Megakernel final : public Executor {
   }
 
   std::string_view name() const override { return "megakernel"; }
+  std::string Dot() const override { return {}; }
   PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
                     const std::function<void(double)>& progress) override;
 

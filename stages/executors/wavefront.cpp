@@ -60,6 +60,7 @@ class Wavefront final : public Executor {
   }
 
   std::string_view name() const override { return "wavefront"; }
+  std::string Dot() const override { return graph_.dot(); }
   PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
                     const std::function<void(double)>& progress) override;
 

@@ -27,12 +27,19 @@ HWY_INLINE Real<D> PowerHeuristic(D d, Real<D> own, Real<D> other) {
   return Splat(d, 1) / hn::MulAdd(ratio, ratio, Splat(d, 1));
 }
 
+template <class D>
+HWY_INLINE Mask<D> AtLeast(D d, Uint<D> depth, uint32_t least) {
+  const IntTag<D> di;  // depths are small, so the signed comparison, which every target has, is the same
+  return hn::RebindMask(d, hn::Gt(hn::BitCast(di, depth), hn::Set(di, static_cast<int32_t>(least) - 1)));
+}
+
 /// One vertex of the paths in flight, as the steps below hand it on.
 template <class D>
 struct Vertex {
   PathLanes<D> path;
   Int<D> primitive;
   Uint<D> depth;            // scattering events before this one
+  Uint<D> number;           // of the vertex in the table of sample dimensions: the camera is 0
   Uint<D> flags;
   SampleKey<D> key;
   SurfacePoint<D> at;
@@ -54,6 +61,7 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
   v.path = p;
   v.flags = hn::BitCast(du, PathInt(d, p, offsetof(PathState, flags)));
   v.depth = hn::And(v.flags, hn::Set(du, kPathDepthMask));
+  v.number = v.depth + hn::Set(du, 1);
   v.key = MakeSampleKey(d, hn::BitCast(du, PathInt(d, p, offsetof(PathState, pixel))),
                         hn::BitCast(du, PathInt(d, p, offsetof(PathState, sample))), c.seed);
   v.ray_origin = PathVec3(d, p, offsetof(PathState, origin));
@@ -76,7 +84,7 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
   // care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and blur).
   const Real<D> density = SafeDiv(d, TwiceTextureArea(d, c, v.at), v.surface.twice_area);
   v.footprint.log2_width = RoughLog2(d, v.cone_width) + RoughLog2(d, density) * Splat(d, 0.5);
-  v.footprint.u_level = HashUniform(d, v.key, v.depth, Purpose::texture_level, hn::Zero(du));
+  v.footprint.u_level = HashUniform(d, v.key, v.number, Purpose::texture_level, hn::Zero(du));
   return v;
 }
 
@@ -87,7 +95,7 @@ HWY_INLINE Mask<D> PassesThrough(D d, const KernelContext& c, const Vertex<D>& v
                                  Mask<D> active) {
   const UintTag<D> du;
   const Uint<D> layers = hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
-  const Real<D> u = HashUniform(d, v.key, v.depth, Purpose::alpha, layers);
+  const Real<D> u = HashUniform(d, v.key, v.number, Purpose::alpha, layers);
   const Mask<D> transparent = hn::Ge(u, Opacity(d, c, v.at, alpha));
   const Mask<D> camera_ray = hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(du)));
   const Mask<D> double_sided = MaterialHas(d, c, v.at.material, kMaterialDoubleSided);
@@ -153,7 +161,7 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> a
     const Vec3<D> normal =
         DecodeNormal(d, hn::BitCast(UintTag<D>(), PathInt(d, v.path, offsetof(PathState, normal))));
     const Triangle<D> t = TriangleVertices(d, c.geometry, v.at.placement, v.primitive);
-    const Real<D> pdf = LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
+    const Real<D> pdf = lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
                                                t.p1, t.p2, Neg<D>(v.toward), v.distance);
     weight = hn::IfThenElse(sampled, PowerHeuristic(d, v.ray_pdf, pdf), weight);
   }
@@ -182,24 +190,25 @@ HWY_INLINE SurfaceParams<D> MaterialParams(D d, const KernelContext& c, const Ve
 
 /// Radiance that a sampled triangle light sends towards `wi`'s origin; other lights know theirs already.
 template <class D>
-HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const LightSample<D>& light,
+HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const lights::LightSample<D>& light,
                                    Mask<D> active) {
   const IntTag<D> di;
-  const Int<D> type = FieldInt(d, c.lights.lights, light.light, offsetof(Light, type));
-  const Mask<D> is_light = hn::RebindMask(d, hn::Ge(light.light, hn::Zero(di)));
-  const Mask<D> triangle = hn::And(
-      hn::And(active, is_light),
-      hn::RebindMask(d, hn::Eq(type, hn::Set(di, static_cast<int32_t>(LightType::triangle)))));
-  if (hn::AllFalse(d, triangle)) return light.radiance;
+  const Mask<D> is_light = hn::And(active, IsPresent(d, light.light));
+  if (hn::AllFalse(d, is_light)) return light.radiance_or_irradiance;
+  const Int<D> valid = hn::IfThenElseZero(hn::RebindMask(di, is_light), light.light);
+  const Int<D> type = FieldInt(d, c.lights.lights, valid, offsetof(Light, type));
+  const Mask<D> triangle =
+      hn::And(is_light, hn::RebindMask(d, hn::Lt(type, hn::Set(di, kLastTriangleType + 1))));
+  if (hn::AllFalse(d, triangle)) return light.radiance_or_irradiance;
 
   const auto field = [&](size_t offset) HWY_ATTR {
-    return hn::IfThenElseZero(hn::RebindMask(di, triangle), FieldInt(d, c.lights.lights, light.light, offset));
+    return hn::IfThenElseZero(hn::RebindMask(di, triangle), FieldInt(d, c.lights.lights, valid, offset));
   };
   const SurfacePoint<D> at = MakeSurfacePoint(d, c, field(offsetof(Light, placement)),
                                               field(offsetof(Light, primitive)), light.b1, light.b2);
   const Vec2<D> uv = TextureCoordinates(d, c, at, hn::Zero(di));
   const Vec3<D> emitted = EmittedRadiance(d, c, at, uv, triangle);
-  return Select<D>(triangle, Mul<D>(light.radiance, emitted), light.radiance);
+  return Select<D>(triangle, Mul<D>(light.radiance_or_irradiance, emitted), light.radiance_or_irradiance);
 }
 
 /// The next vertex's start and the shading frame here, shared by light and BSDF sampling.
@@ -223,10 +232,10 @@ struct ShadowRay {
 template <class D>
 HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& v, const Scatter<D>& s,
                                   Mask<D> active) {
-  const Real<D> u_pick = Sample1D(d, v.key, v.depth, Purpose::light_pick);
-  const Vec2<D> u_point = Sample2D(d, v.key, v.depth, Purpose::light_point);
+  const Real<D> u_pick = Sample1D(d, v.key, v.number, Purpose::light_pick);
+  const Vec2<D> u_point = Sample2D(d, v.key, v.number, Purpose::light_point);
   const Vec3<D> normal = DecodeNormal(d, s.packed_normal);
-  const LightSample<D> light = SampleLight(d, c.lights, active, s.origin, normal, u_pick, u_point);
+  const lights::LightSample<D> light = lights::SampleLight(d, c.lights, active, s.origin, normal, u_pick, u_point);
   const Real<D> zero = hn::Zero(d);
   Mask<D> wanted = hn::And(hn::And(active, hn::Gt(light.pdf, zero)),
                            hn::Gt(Dot(light.wi, v.surface.geometric), zero));
@@ -262,9 +271,8 @@ struct Bounce {
 template <class D>
 HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& v, const Scatter<D>& s,
                                   Mask<D> active) {
-  const UintTag<D> du;
-  const Real<D> u_lobe = Sample1D(d, v.key, v.depth, Purpose::lobe);
-  const Vec2<D> u = Sample2D(d, v.key, v.depth, Purpose::bsdf);
+  const Real<D> u_lobe = Sample1D(d, v.key, v.number, Purpose::lobe);
+  const Vec2<D> u = Sample2D(d, v.key, v.number, Purpose::bsdf);
   const BsdfSample<D> sample = SampleBsdf(d, s.bsdf, s.wo, u_lobe, u);
   Bounce<D> b;
   b.direction = ToWorld(s.frame, sample.wi);
@@ -274,10 +282,10 @@ HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& 
                     hn::And(hn::Gt(Dot(b.direction, v.surface.geometric), hn::Zero(d)),
                             hn::Gt(MaxComponent(b.throughput), hn::Zero(d))));
 
-  const Mask<D> roulette = hn::And(b.alive, hn::RebindMask(d, hn::Ge(v.depth, hn::Set(du, c.roulette_depth))));
+  const Mask<D> roulette = hn::And(b.alive, AtLeast(d, v.depth, c.roulette_depth));
   if (!hn::AllFalse(d, roulette)) {
     const Real<D> survival = hn::Min(MaxComponent(b.throughput), Splat(d, 1));
-    const Real<D> u_roulette = Sample1D(d, v.key, v.depth, Purpose::roulette);
+    const Real<D> u_roulette = Sample1D(d, v.key, v.number, Purpose::roulette);
     const Mask<D> dies = hn::And(roulette, hn::Ge(u_roulette, survival));
     b.alive = hn::AndNot(dies, b.alive);
     b.throughput = Select<D>(roulette, Scale(b.throughput, SafeDiv(d, Splat(d, 1), survival)), b.throughput);
@@ -346,7 +354,7 @@ HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p,
   v.radiance = Select<D>(unlit, Add<D>(v.radiance, Mul<D>(v.throughput, base.rgb)), v.radiance);
   AddEmission(d, c, v, hn::AndNot(unlit, active));
 
-  const Mask<D> deep = hn::RebindMask(d, hn::Ge(v.depth, hn::Set(UintTag<D>(), c.max_depth)));
+  const Mask<D> deep = AtLeast(d, v.depth, c.max_depth);
   const Mask<D> ends = hn::And(active, hn::Or(unlit, deep));
   if (!hn::AllFalse(d, ends)) EndPaths(d, v, ends, next);
   active = hn::AndNot(ends, active);
@@ -372,11 +380,11 @@ HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
   const Mask<D> bounced = hn::Gt(pdf, hn::Zero(d));
   Real<D> weight = Splat(d, 1);
   if (!hn::AllFalse(d, bounced)) {
-    const Real<D> light_pdf = LightPdfForEnvironment(d, c.lights, direction);
+    const Real<D> light_pdf = lights::LightPdfForEnvironment(d, c.lights, direction);
     weight = hn::IfThenElse(bounced, PowerHeuristic(d, pdf, light_pdf), weight);
   }
   const Vec3<D> throughput = PathVec3(d, p, offsetof(PathState, throughput));
-  const Vec3<D> environment = EnvironmentRadiance(d, c.lights.environment, direction);
+  const Vec3<D> environment = lights::EnvironmentRadiance(d, c.lights.environment, direction);
   const Vec3<D> sum = Add<D>(PathVec3(d, p, offsetof(PathState, radiance)),
                              Scale(Mul<D>(throughput, environment), weight));
   StoreVec3(d, ListLanes(d, p, p.active), offsetof(PathState, radiance), sum);

@@ -57,7 +57,7 @@ HWY_INLINE Real<D> Interpolate(D d, const float* floats, const SurfacePoint<D>& 
 
 template <class D>
 HWY_INLINE Mask<D> IsPresent(D d, Int<D> offset) {
-  return hn::RebindMask(d, hn::Ge(offset, hn::Zero(IntTag<D>())));
+  return hn::RebindMask(d, hn::Gt(offset, hn::Set(IntTag<D>(), kNone)));
 }
 
 /// Normals of object space to world space, unnormalised; outward stays outward under mirroring.

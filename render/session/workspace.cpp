@@ -1,0 +1,100 @@
+// Puts a render together: threads, kernels, scene, BVH, film, executor.
+#include "render/session/workspace.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace carpool::render {
+namespace {
+
+uint64_t MemoryBytes(const RenderSettings& settings, int threads) {
+  if (settings.memory_mb > 0) return uint64_t{static_cast<uint32_t>(settings.memory_mb)} << 20;
+  return (uint64_t{64} << 20) + (uint64_t{4} << 20) * static_cast<uint64_t>(std::max(0, threads - 2));
+}
+
+carpool::Policy SchedulerPolicy(Policy policy) {
+  switch (policy) {
+    case Policy::fullest: return carpool::Policy::fullest_first();
+    case Policy::oldest: return carpool::Policy::oldest_first();
+    case Policy::deepest: break;
+  }
+  return carpool::Policy::deepest_first();
+}
+
+}  // namespace
+
+Threads::Threads(int wanted)
+    : count_(wanted > 0 ? wanted : tbb::this_task_arena::max_concurrency()),
+      limit_(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(count_)),
+      arena_(count_) {}
+
+const stages::Kernels& KernelsFor(Isa isa) {
+  const stages::Kernels* const kernels = stages::FindKernels(Name(isa));
+  if (kernels != nullptr) return *kernels;
+  std::string available;
+  for (const stages::Kernels& k : stages::AvailableKernels()) available += (available.empty() ? "" : ", ") + std::string(k.isa);
+  throw Error(ExitCode::usage, "--isa " + std::string(Name(isa)) + ": this machine has " +
+                                   (available.empty() ? "none of SSE4.2, AVX2, AVX-512" : available));
+}
+
+PreparedScene LoadScene(const RenderSettings& settings, const WarningSink& warn) {
+  LoadOptions load;
+  load.allow_outside = settings.allow_outside;
+  load.scene = settings.scene;
+  load.warn = warn;
+  AssembleOptions assemble;
+  assemble.camera = settings.camera;
+  assemble.environment = settings.env_path;
+  assemble.width = settings.width;
+  assemble.height = settings.height;
+  assemble.default_width = kDefaultWidth;
+  assemble.warn = warn;
+  const auto begin = std::chrono::steady_clock::now();
+  ImportedScene imported = LoadGltf(settings.scene_path, load);
+  const double import = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  PreparedScene scene = AssembleScene(std::move(imported), assemble);
+  scene.times.import = import;
+  return scene;
+}
+
+stages::KernelContext MakeContext(const PreparedScene& scene, const Plan& plan,
+                                  const RenderSettings& settings) {
+  stages::KernelContext c;
+  c.camera = scene.tables.camera;
+  c.geometry = stages::ViewOf(scene.tables.geometry);
+  c.materials = scene.tables.materials.data();
+  c.textures = stages::ViewOf(scene.tables.textures);
+  c.lights = stages::LightViewOf(scene.tables);
+  c.bsdf = stages::SharedBsdfTables().View();
+  c.first_hits = plan.first_hits();
+  c.width = static_cast<uint32_t>(scene.width);
+  c.height = static_cast<uint32_t>(scene.height);
+  c.seed = settings.seed;
+  c.max_depth = static_cast<uint32_t>(settings.max_depth);
+  c.roulette_depth = kRouletteDepth;
+  return c;
+}
+
+Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Threads& threads)
+    : scene_(std::move(scene)),
+      plan_(MakePlan(scene_, settings)),
+      kernels_(KernelsFor(settings.isa)),
+      bvh_(scene_.tables, scene_.placement, {std::string(Name(settings.isa)), settings.robust}),
+      film_(static_cast<uint32_t>(scene_.width), static_cast<uint32_t>(scene_.height), plan_.film),
+      context_(MakeContext(scene_, plan_, settings)) {
+  context_.trace = bvh_.View();
+  context_.film = &film_;
+  stages::ExecutorOptions options;
+  options.arena = &threads.arena();
+  options.threads = static_cast<uint32_t>(threads.count());
+  options.memory_bytes = MemoryBytes(settings, threads.count());
+  options.batch_items = static_cast<uint32_t>(settings.batch_items);
+  options.policy = SchedulerPolicy(settings.policy);
+  executor_reason_ = plan_.executor_reason;
+  executor_ = plan_.executor == Executor::megakernel
+                  ? stages::MakeMegakernel(context_, kernels_, options)
+                  : stages::MakeWavefront(context_, kernels_, scene_.tables.geometry.placements, options);
+}
+
+}  // namespace carpool::render
