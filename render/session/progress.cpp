@@ -81,6 +81,8 @@ void ProgressPrinter::operator()(const ProgressUpdate& update) {
   const std::lock_guard lock(mutex_);
   if (finished_) return;
   const bool due = IsDue(update);
+  const bool phase_ended = any_ && update.phase != last_.phase;
+  if (phase_ended && pending_ && style_ == ProgressStyle::lines) Show();  // how it ended
   if (!any_ || update.phase != last_.phase) phase_start_s_ = any_ ? update.elapsed_s : 0;
   last_ = update;
   any_ = pending_ = true;

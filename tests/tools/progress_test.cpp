@@ -112,6 +112,17 @@ TEST(Progress, LinesComeWithEachPhaseEveryFiveSecondsAndAtTheEnd) {
   EXPECT_EQ(Count(screen.Text(), "\r"), 0u);
 }
 
+TEST(Progress, LinesTellHowAPhaseEnded) {
+  const Screen screen;
+  ProgressPrinter progress(ProgressStyle::lines, 80, screen.stream());
+  progress(Rendering(0.25, 1));
+  progress(Rendering(1, 2));  // too early for a line of its own
+  progress({.phase = ProgressPhase::save, .elapsed_s = 2});
+  const std::vector<std::string> lines = Lines(screen.Text());
+  ASSERT_EQ(lines.size(), 3u) << screen.Text();
+  EXPECT_NE(lines[1].find("samples 256/256"), std::string::npos) << lines[1];
+}
+
 TEST(Progress, BarIsRedrawnAtMostTenTimesASecond) {
   const Screen screen;
   ProgressPrinter progress(ProgressStyle::bar, 80, screen.stream());
