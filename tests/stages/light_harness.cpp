@@ -1,7 +1,9 @@
 // Feeds queries to the kernels lane by lane and collects what they return.
 #include "tests/stages/light_harness.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <limits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/stages/light_harness.cpp"
@@ -166,17 +168,27 @@ void RunOne(D d, LightKernel kernel, const LightView& view, Mask<D> active, cons
   }
 }
 
+/// What lanes that are not active may hold: numbers that lead nowhere. Placements must be valid even so.
+LightQuery Junk() {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  LightQuery q;
+  for (float* v : {q.position, q.normal, q.dir, q.p, q.p + 3, q.p + 6}) v[0] = v[1] = v[2] = kNan;
+  q.distance = q.u_pick = q.u[0] = q.u[1] = kNan;
+  q.light = std::numeric_limits<int32_t>::max();
+  return q;
+}
+
 template <class D>
 std::vector<LightResult> RunAll(D d, LightKernel kernel, const LightView& view,
-                                const std::vector<LightQuery>& queries) {
+                                std::vector<LightQuery> queries) {
   const IntTag<D> di;
   std::vector<LightResult> results(queries.size());
   const size_t lanes = hn::Lanes(d);
-  for (size_t begin = 0; begin < queries.size(); begin += lanes) {
-    const size_t count = std::min(lanes, queries.size() - begin);
-    // Lanes past the end repeat the last query; they are not active and not stored.
-    const Int<D> index = hn::Min(hn::Iota(di, 0), hn::Set(di, static_cast<int32_t>(count) - 1));
-    RunOne(d, kernel, view, hn::FirstN(d, count), LoadQueries(d, queries.data() + begin, index),
+  queries.resize((queries.size() + lanes - 1) / lanes * lanes, Junk());
+  for (size_t begin = 0; begin < results.size(); begin += lanes) {
+    const size_t count = std::min(lanes, results.size() - begin);
+    RunOne(d, kernel, view, hn::FirstN(d, count),
+           LoadQueries(d, queries.data() + begin, hn::Iota(di, 0)),
            ResultStore<D>{d, results.data() + begin, count});
   }
   return results;
