@@ -76,8 +76,16 @@ void Layout::set_weights(const Graph& graph) {
           "carpool: source '" + source.options.name + "' needs " + std::to_string(charge) +
           " credits for one item, but RunOptions::in_flight is " + std::to_string(in_flight));
     }
-    source_charge.push_back(charge);
+    // Not for every single credit that comes back: for an eighth of all, or a burst.
+    const std::uint64_t items =
+        std::clamp<std::uint64_t>(in_flight / charge / 8, 1, source.options.burst);
+    sources.push_back({.charge = static_cast<std::int64_t>(charge),
+                       .burst = source.options.burst,
+                       .plenty = static_cast<std::int64_t>(items * charge)});
   }
+  least_plenty = std::min_element(sources.begin(), sources.end(), [](const auto& a, const auto& b) {
+                   return a.plenty < b.plenty;
+                 })->plenty;
 }
 
 void Layout::order_by_rank(const Graph& graph) {
@@ -113,6 +121,7 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
     const Graph::Stage& from = graph.stages()[i];
     StageLayout& stage = stages[i];
     stage.item_bytes = static_cast<std::uint32_t>(from.item_bytes);
+    stage.item_bytes_inverse = ((std::uint64_t{1} << 32) + stage.item_bytes - 1) / stage.item_bytes;
     stage.first_slot = from.first_slot;
     stage.bins = from.options.bins;
     stage.lanes = from.options.lanes;
@@ -217,7 +226,7 @@ void Layout::limit_classes() {
 
 std::size_t Layout::table_bytes() const {
   const std::size_t per_worker = OpenTable::bytes_for(*this) + ReadyQueue::bytes_for(lanes) +
-                                 WorkerStats::bytes_for(stages.size(), source_charge.size(), slots);
+                                 WorkerStats::bytes_for(stages.size(), sources.size(), slots);
   return per_worker * workers;
 }
 

@@ -27,6 +27,7 @@ struct BlockLevel {
 
 struct StageLayout {
   std::uint32_t item_bytes = 0;
+  std::uint64_t item_bytes_inverse = 0;  // 2^32 / item_bytes, rounded up
   std::uint32_t first_slot = 0;
   std::uint32_t bins = 0;
   std::uint32_t block_items = 0;  // after FlushOptions::count
@@ -38,6 +39,12 @@ struct StageLayout {
   FlushCause full_cause = FlushCause::full;
   std::uint8_t top_level = 0;
   std::array<BlockLevel, kMaxLevels> levels{};
+};
+
+struct SourceLayout {
+  std::int64_t charge = 1;  // credits per item that it emits
+  std::int64_t burst = 1;   // items per call, at most
+  std::int64_t plenty = 1;  // call it when so many credits are there, even if there is other work
 };
 
 // PoolClass is one size of block in the pool.
@@ -60,9 +67,10 @@ struct Layout {
   bool track_age = false;        // are open blocks linked by age?
   std::uint32_t node_class = 0;  // the pool class that ReadyBlocks come from
   std::vector<StageLayout> stages;
-  std::vector<PoolClass> classes;            // ascending in size
-  std::vector<std::uint64_t> tally_of;       // by stage; see Emitter
-  std::vector<std::uint64_t> source_charge;  // credits per item that a source emits
+  std::vector<PoolClass> classes;       // ascending in size
+  std::vector<std::uint64_t> tally_of;  // by stage; see Emitter
+  std::vector<SourceLayout> sources;
+  std::int64_t least_plenty = 0;  // the smallest SourceLayout::plenty
   std::vector<std::uint32_t> stage_of_bit;
 
  private:

@@ -2,6 +2,7 @@
 #include "open_table.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -55,7 +56,7 @@ void OpenTable::open(const StageLayout& stage, std::uint32_t bin) {
                    .end = data + std::size_t{level.items} * stage.item_bytes,
                    .begin = data,
                    .level = 0};
-  grades_[level.grade].set(stage.first_bit + bin);
+  set_grade(level.grade, stage.first_bit + bin);
   ++count_;
   if (layout_.track_age) {
     link(index);
@@ -75,8 +76,8 @@ void OpenTable::go_up(const StageLayout& stage, std::uint32_t bin) {
     slot.write = data + used;
   }
   if (from.grade != to.grade) {
-    grades_[from.grade].clear(stage.first_bit + bin);
-    grades_[to.grade].set(stage.first_bit + bin);
+    clear_grade(from.grade, stage.first_bit + bin);
+    set_grade(to.grade, stage.first_bit + bin);
   }
   slot.end = slot.begin + std::size_t{to.items} * stage.item_bytes;
   ++slot.level;
@@ -89,11 +90,11 @@ Block OpenTable::remove(std::uint32_t bit) {
   const std::uint32_t index = stage.first_slot + bin;
   detail::OpenSlot& slot = table_[index];
   const Block block{.data = slot.begin,
-                    .items = static_cast<std::uint32_t>(slot.write - slot.begin) / stage.item_bytes,
+                    .items = items_in(stage, slot),
                     .stage = stage_index,
                     .bin = bin,
                     .level = static_cast<std::uint8_t>(slot.level)};
-  grades_[stage.levels[slot.level].grade].clear(bit);
+  clear_grade(stage.levels[slot.level].grade, bit);
   slot = {};
   --count_;
   if (layout_.track_age) {
@@ -122,14 +123,10 @@ std::uint32_t OpenTable::choose() {
       }
     }
   }
-  const bool deepest = policy_.kind() == Policy::Kind::deepest_first;
-  for (std::uint32_t g = kGrades; g-- > 0;) {
-    if (!grades_[g].empty()) {
-      cursor_ = deepest ? grades_[g].first() : grades_[g].first_from(cursor_);
-      return cursor_;
-    }
-  }
-  return Bitmap::kNone;  // not reached: count_ is not zero
+  const Bitmap& fullest = grades_[static_cast<std::uint32_t>(std::bit_width(grades_in_use_) - 1)];
+  cursor_ =
+      policy_.kind() == Policy::Kind::deepest_first ? fullest.first() : fullest.first_from(cursor_);
+  return cursor_;
 }
 
 std::uint32_t OpenTable::choose_by_lane_function() {

@@ -72,6 +72,19 @@ class OpenTable final : public Emitter {
   void open(const StageLayout& stage, std::uint32_t bin);
   void go_up(const StageLayout& stage, std::uint32_t bin);
   Block remove(std::uint32_t bit);
+  std::uint32_t items_in(const StageLayout& stage, const detail::OpenSlot& slot) const {
+    // A division by multiplying, exact because the difference is a multiple of item_bytes.
+    const auto bytes = static_cast<std::uint64_t>(slot.write - slot.begin);
+    return static_cast<std::uint32_t>(bytes * stage.item_bytes_inverse >> 32);
+  }
+  void set_grade(std::uint32_t grade, std::uint32_t bit) {
+    grades_[grade].set(bit);
+    grades_in_use_ |= 1U << grade;
+  }
+  void clear_grade(std::uint32_t grade, std::uint32_t bit) {
+    grades_[grade].clear(bit);
+    grades_in_use_ &= ~(std::uint32_t{grades_[grade].empty()} << grade);
+  }
   std::uint32_t choose();
   std::uint32_t choose_by_lane_function();
 
@@ -84,6 +97,7 @@ class OpenTable final : public Emitter {
   BlockSink& sink_;
   std::vector<detail::OpenSlot> table_;
   std::array<Bitmap, kGrades> grades_;
+  std::uint32_t grades_in_use_ = 0;  // a bit per grade
   std::vector<AgeLink> ages_;
   std::uint32_t oldest_ = Bitmap::kNone;
   std::uint32_t newest_ = Bitmap::kNone;

@@ -127,7 +127,7 @@ bool RunCore::source_ready() const {
     const std::uint32_t concurrency = graph.sources()[i].options.concurrency;
     if (!sources_[i].exhausted.load(std::memory_order_relaxed) &&
         (concurrency == 0 || sources_[i].inside.load(std::memory_order_relaxed) < concurrency) &&
-        credits.available() >= static_cast<std::int64_t>(layout.source_charge[i])) {
+        credits.available() >= layout.sources[i].charge) {
       return true;
     }
   }
@@ -192,13 +192,20 @@ WorkerReport worker_report(const WorkerStats& stats, double tick) {
 
 }  // namespace
 
+Outcome RunCore::outcome() const {
+  if (outcome_ != Outcome::completed || open_sources_.load(std::memory_order_relaxed) == 0) {
+    return outcome_;
+  }
+  return options.cancel.cancelled() ? Outcome::cancelled
+                                    : Outcome::drained;  // what else stops a source
+}
+
 RunReport RunCore::report() {
   if (failure_) {
     std::rethrow_exception(failure_);
   }
   RunReport report;
-  report.outcome =
-      outcome_ == Outcome::completed && options.cancel.draining() ? Outcome::drained : outcome_;
+  report.outcome = outcome();
   report.policy = options.policy.name();
   report.seconds = clock.seconds();
   const double tick = clock.seconds_per_tick();

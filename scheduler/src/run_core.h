@@ -87,6 +87,7 @@ class RunCore {
     std::atomic<bool> exhausted{false};
   };
 
+  Outcome outcome() const;
   void add_notes(RunReport& report) const;
 
   Summoner* const summoner_;

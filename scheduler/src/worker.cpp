@@ -49,6 +49,7 @@ void Worker::serve(bool searching) {
   searching_ = searching;
   search_began_ = now_ = came;
   try {
+    check_end();
     work_until_idle();
   } catch (
       ...) {  // from a kernel, a source, a policy or a progress callback, or for lack of memory
@@ -104,30 +105,27 @@ void Worker::unpack(ReadyBlock* ready, Work& work) {
 }
 
 bool Worker::take_source(Work& work, bool last_resort) {
-  if (!core_.sources_open()) {
+  const std::int64_t credits = credits_.pocket() + core_.credits.available();
+  if ((!last_resort && credits < layout_.least_plenty) || !core_.sources_open()) {
     return false;
   }
-  const auto count = static_cast<std::uint32_t>(layout_.source_charge.size());
+  const auto count = static_cast<std::uint32_t>(layout_.sources.size());
   for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint32_t source = (next_source_ + i) % count;
-    const auto charge = static_cast<std::int64_t>(layout_.source_charge[source]);
-    const std::int64_t burst = core_.graph.sources()[source].options.burst;
-    // Not for every single credit: an eighth of all, or a burst.
-    const std::int64_t items =
-        last_resort ? 1 : std::clamp<std::int64_t>(core_.credits.limit() / charge / 8, 1, burst);
-    if (credits_.pocket() + core_.credits.available() < items * charge ||
-        !core_.try_enter_source(source)) {
+    const std::uint32_t index = (next_source_ + i) % count;
+    const SourceLayout& source = layout_.sources[index];
+    const std::int64_t least = last_resort ? source.charge : source.plenty;
+    if (credits < least || !core_.try_enter_source(index)) {
       continue;
     }
-    const std::int64_t got = credits_.reserve(items * charge, burst * charge);
+    const std::int64_t got = credits_.reserve(least, source.burst * source.charge);
     if (got == 0) {
-      core_.leave_source(source, false);
+      core_.leave_source(index, false);
       continue;
     }
     work.is_source = true;
-    work.source = source;
-    work.budget = static_cast<std::uint32_t>(std::min(got / charge, burst));
-    next_source_ = source + 1;
+    work.source = index;
+    work.budget = static_cast<std::uint32_t>(std::min(got / source.charge, source.burst));
+    next_source_ = index + 1;
     return true;
   }
   return false;

@@ -1,0 +1,156 @@
+// Random graphs whose result is known.
+#include "random_graph.h"
+
+#include <algorithm>
+
+namespace carpool_test {
+
+namespace {
+constexpr std::size_t kMostWorkers = 128;
+}
+
+RandomGraph::RandomGraph(const Shape& shape)
+    : shape_(shape),
+      next_(std::make_unique<std::atomic<std::uint64_t>[]>(shape.sources)),
+      counts_(kMostWorkers) {
+  for (std::uint32_t s = 0; s < shape.stages; ++s) {
+    const std::uint64_t dice = mix(shape.seed * 1000 + s);
+    const auto bins = static_cast<std::uint32_t>(1 + dice % shape.most_bins);
+    const bool narrow = shape.explicit_weights && s + 1 == shape.stages;
+    bins_.push_back(bins);
+    stages_.push_back(graph_.add_stage<Item>({.name = "s" + std::to_string(s),
+                                              .bins = bins,
+                                              .block_items = shape.block_items,
+                                              .lanes = 8,
+                                              .rank = static_cast<int>(dice >> 32 & 3),
+                                              .weight = narrow ? 1U : 0U}));
+  }
+  for (const auto stage : stages_) {
+    graph_.set_kernel(stage, [this](const carpool::Batch<Item>& batch, carpool::Emitter& out) {
+      work(batch, out);
+    });
+    for (const auto to : stages_) {
+      graph_.add_edge(stage, to);
+    }
+  }
+  for (std::uint32_t i = 0; i < shape.sources; ++i) {
+    const auto source =
+        graph_.add_source({.name = "source" + std::to_string(i),
+                           .fan_out = shape.fan_out,
+                           .concurrency = shape.source_concurrency,
+                           .burst = 256},
+                          [this, i](carpool::SourceContext& ctx, carpool::Emitter& out) {
+                            return produce(i, ctx, out);
+                          });
+    for (const auto to : stages_) {
+      graph_.add_edge(source, to);
+    }
+  }
+}
+
+RandomGraph::Item RandomGraph::root(std::uint32_t source, std::uint64_t index) const {
+  const std::uint64_t path = mix(shape_.seed ^ mix(index * 31 + source));
+  return {.path = path,
+          .hops = static_cast<std::uint32_t>(1 + (path >> 20) % shape_.most_hops),
+          .width = shape_.fan_out};
+}
+
+std::uint32_t RandomGraph::stage_of(const Item& item) const {
+  const auto count = shape_.stages;
+  const auto stage = static_cast<std::uint32_t>((item.path >> 33) % count);
+  // With explicit weights, only items that can no longer split may go to the last stage.
+  return shape_.explicit_weights && item.width > 1 && stage + 1 == count ? 0 : stage;
+}
+
+std::uint32_t RandomGraph::bin_of(const Item& item) const {
+  return shape_.one_bin_flood
+             ? 0
+             : static_cast<std::uint32_t>((item.path >> 7) % bins_[stage_of(item)]);
+}
+
+template <class Emit>
+void RandomGraph::successors(const Item& item, Emit emit) const {
+  if (item.hops <= 1) {
+    return;
+  }
+  std::uint32_t width = item.width;
+  std::uint32_t child = 0;
+  while (width > 0) {
+    const std::uint64_t path = mix(item.path + 77 * ++child);
+    std::uint32_t share = width;
+    if (width > 1 && (shape_.split_early || path % 3 == 0)) {
+      share = shape_.split_early ? 1 : static_cast<std::uint32_t>(1 + path / 3 % width);
+    }
+    width -= share;
+    if (child > 1 && !shape_.split_early && path % 5 == 0) {
+      continue;  // a dead end
+    }
+    emit(Item{.path = path, .hops = item.hops - 1, .width = share});
+  }
+}
+
+void RandomGraph::work(const carpool::Batch<Item>& batch, carpool::Emitter& out) {
+  if (over_.load()) {
+    late_.fetch_add(1);
+  }
+  if (on_batch) {
+    on_batch();
+  }
+  Tally& tally =
+      counts_[batch.worker].tally;  // not atomic: the scheduler promises one call per worker
+  for (const Item& item : batch.items) {
+    if (bin_of(item) != batch.bin) {
+      tally.sum += 1;  // spoils the comparison
+    }
+    ++tally.visits;
+    tally.sum += visit_value(item);
+    if (shape_.uneven && item.path % 64 == 0) {
+      std::uint64_t x = item.path;
+      for (int i = 0; i < 2000; ++i) {
+        x = mix(x);
+      }
+      asm volatile("" : "+r"(x));  // keeps the loop
+    }
+    successors(
+        item, [&](const Item& child) { out.emit(stages_[stage_of(child)], bin_of(child), child); });
+  }
+}
+
+carpool::SourceStatus RandomGraph::produce(std::uint32_t source, carpool::SourceContext& ctx,
+                                           carpool::Emitter& out) {
+  const std::uint64_t first = next_[source].fetch_add(ctx.budget);
+  const std::uint64_t last = std::min<std::uint64_t>(shape_.items, first + ctx.budget);
+  for (std::uint64_t index = first; index < last; ++index) {
+    const Item item = root(source, index);
+    out.emit(stages_[stage_of(item)], bin_of(item), item);
+  }
+  return first + ctx.budget >= shape_.items ? carpool::SourceStatus::exhausted
+                                            : carpool::SourceStatus::more;
+}
+
+Tally RandomGraph::counted() const {
+  Tally sum;
+  for (const Count& count : counts_) {
+    sum.visits += count.tally.visits;
+    sum.sum += count.tally.sum;
+  }
+  return sum;
+}
+
+void RandomGraph::add_to(Tally& tally, const Item& item) const {
+  ++tally.visits;
+  tally.sum += visit_value(item);
+  successors(item, [&](const Item& child) { add_to(tally, child); });
+}
+
+Tally RandomGraph::expected() const {
+  Tally tally;
+  for (std::uint32_t source = 0; source < shape_.sources; ++source) {
+    for (std::uint64_t index = 0; index < shape_.items; ++index) {
+      add_to(tally, root(source, index));
+    }
+  }
+  return tally;
+}
+
+}  // namespace carpool_test
