@@ -43,7 +43,8 @@ Cone UnionOfCones(Cone a, Cone b) {
   const double between = std::acos(cos);
   if (std::min(between + b.theta, kPi) <= a.theta) return a;
   const double theta = (a.theta + between + b.theta) / 2;
-  if (theta >= kPi || !TurnTowards(a.axis, b.axis, cos, theta - a.theta)) {
+  if (theta >= kPi) return {a.axis, kPi};
+  if (!TurnTowards(a.axis, b.axis, cos, theta - a.theta)) {
     // Parallel axes whose angles differ by rounding keep the wider cone; opposite ones fill the sphere.
     return cos > 0 ? a : Cone{a.axis, kPi};
   }
