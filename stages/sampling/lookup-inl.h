@@ -1,7 +1,7 @@
-// Table look-ups by index for the samplers and BSDF tables, safe at one lane.
+// Table look-ups by index for the samplers and BSDF tables, safe at any width.
 //
-// Highway's gathers read all lanes of a 128-bit register even when the tag has one, so that unused lanes
-// would address memory at random; one lane therefore loads a scalar. Per-target header: see
+// Highway's x86 gathers read all four lanes of a register even when the tag has fewer, so that unused lanes
+// would address memory at random; short tags therefore load scalars. Per-target header: see
 // stages/simd/lanes-inl.h.
 
 #if defined(CARPOOL_STAGES_SAMPLING_LOOKUP_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -46,28 +46,35 @@ HWY_INLINE Real<D> FromIndex(D d, Index<D> i) {
   }
 }
 
-/// table[index] as D's lanes; every index must be in range.
+/// table[index]; every index must be in range.
+template <class DT>
+HWY_INLINE hn::Vec<DT> LookUp(DT dt, const hn::TFromD<DT>* HWY_RESTRICT table, hn::Vec<hn::RebindToSigned<DT>> index) {
+  if constexpr (hn::MaxLanes(DT()) == 1) {
+    return hn::Set(dt, table[hn::GetLane(index)]);
+  } else if constexpr (hn::MaxLanes(DT()) < 4) {
+    int32_t lanes[4];
+    hn::TFromD<DT> values[4];
+    hn::StoreU(index, hn::RebindToSigned<DT>(), lanes);
+    for (size_t i = 0; i < hn::Lanes(dt); ++i) values[i] = table[lanes[i]];
+    return hn::LoadU(dt, values);
+  } else {
+    return hn::GatherIndex(dt, table, index);
+  }
+}
+
+/// A table of floats as D's lanes, and a table of words.
 template <class D>
 HWY_INLINE Real<D> LookUpFloat(D d, const float* HWY_RESTRICT table, Index<D> index) {
-  if constexpr (hn::MaxLanes(d) == 1) {
-    return Splat(d, table[hn::GetLane(index)]);
+  const hn::Rebind<float, D> df;
+  if constexpr (sizeof(hn::TFromD<D>) == 4) {
+    return LookUp(df, table, index);
   } else {
-    const auto values = hn::GatherIndex(hn::Rebind<float, D>(), table, index);
-    if constexpr (sizeof(hn::TFromD<D>) == 4) {
-      return values;
-    } else {
-      return hn::PromoteTo(d, values);
-    }
+    return hn::PromoteTo(d, LookUp(df, table, index));
   }
 }
 template <class D>
-HWY_INLINE Index<D> LookUpWord(D d, const int32_t* HWY_RESTRICT table, Index<D> index) {
-  const IndexTag<D> di;
-  if constexpr (hn::MaxLanes(d) == 1) {
-    return hn::Set(di, table[hn::GetLane(index)]);
-  } else {
-    return hn::GatherIndex(di, table, index);
-  }
+HWY_INLINE Index<D> LookUpWord(D, const int32_t* HWY_RESTRICT table, Index<D> index) {
+  return LookUp(IndexTag<D>(), table, index);
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

@@ -45,11 +45,23 @@ HWY_INLINE Vec2<D> CosSinTurns(D d, Real<D> turns) {
   return {x * sign, y * sign};
 }
 
+/// 2^n by its exponent bits, for |n| < 127. (Highway's shifts by a variable count are wrong at one lane on
+/// x86: they read the register's unused lanes as part of the count.)
+template <class D>
+HWY_INLINE Real<D> PowerOfTwo(D d, Index<D> n) {
+  const hn::Rebind<float, D> df;
+  const auto power = hn::BitCast(df, hn::ShiftLeft<23>(n + hn::Set(IndexTag<D>(), 127)));
+  if constexpr (sizeof(hn::TFromD<D>) == 4) {
+    return power;
+  } else {
+    return hn::PromoteTo(d, power);
+  }
+}
+
 /// 2^x - 1 for 0 <= x < 30, to a few units in the last place even where it is tiny: Taylor polynomial about
 /// the nearest integer (remainder below 1e-8).
 template <class D>
 HWY_INLINE Real<D> Exp2Minus1(D d, Real<D> x) {
-  const IndexTag<D> di;
   const Real<D> whole = hn::Round(x);
   const Real<D> f = (x - whole) * Splat(d, std::numbers::ln2);
   Real<D> y = hn::MulAdd(f, Splat(d, 1.0 / 5040), Splat(d, 1.0 / 720));
@@ -58,7 +70,7 @@ HWY_INLINE Real<D> Exp2Minus1(D d, Real<D> x) {
   y = hn::MulAdd(y, f, Splat(d, 1.0 / 6));
   y = hn::MulAdd(y, f, Splat(d, 0.5));
   y = hn::MulAdd(y * f, f, f);
-  const Real<D> power = FromIndex(d, hn::Shl(hn::Set(di, 1), ToIndex(d, whole)));
+  const Real<D> power = PowerOfTwo(d, ToIndex(d, whole));
   return hn::MulAdd(power, y, power - Splat(d, 1));
 }
 

@@ -84,14 +84,16 @@ AlbedoPair Integrate(double mu, double alpha, int heights, const std::vector<dou
   o.stretched_z = o.mu / length;
   o.smith = length;
   Ring sum;
+  double weights = 0;
   for (int i = 0; i < heights; ++i) {
     // Cubed, because what roughness changes lies near the horizon of the stretched hemisphere.
     const double v = (i + 0.5) / heights;
     const Ring ring = SumRing(o, v * v * v, cosines);
-    sum.all += 3 * v * v * ring.all;
-    sum.fresnel += 3 * v * v * ring.fresnel;
+    sum.all += v * v * ring.all;
+    sum.fresnel += v * v * ring.fresnel;
+    weights += v * v;
   }
-  const double scale = 1.0 / (heights * static_cast<double>(cosines.size()));
+  const double scale = 1.0 / (weights * static_cast<double>(cosines.size()));
   return {std::max(0.0, 1 - sum.all * scale), sum.fresnel * scale};
 }
 

@@ -18,7 +18,7 @@ constexpr double kMinRoughness = 0.01;
 
 constexpr int kAlbedoCosines = 48;
 constexpr int kAlbedoRoughnesses = 32;   // uniform in roughness from kMinRoughness to 1
-constexpr int kAverageRoughnesses = 63;  // likewise
+constexpr int kAverageRoughnesses = 249;  // likewise; means grow as roughness^4, so they need more
 
 /// Columns of the table of averages: 2 * integral of mu M, of mu B, the log2 below, and one of padding.
 constexpr int kAverageColumns = 4;
@@ -34,8 +34,8 @@ constexpr double kAlbedoCoordinateShare = 0.6;
 
 /// Largest error of an interpolated albedo (any F0 <= F90 <= 1), hence of every furnace: for mu >= 0.01,
 /// and down to mu = 1e-4. Measured by tests/stages/bsdf_tables_test.cpp.
-constexpr double kAlbedoResidual = 0.003;
-constexpr double kAlbedoResidualGrazing = 0.01;
+constexpr double kAlbedoResidual = 0.002;
+constexpr double kAlbedoResidualGrazing = 0.004;
 
 /// Borrowed pointers for kernels.
 struct BsdfTablesView {
