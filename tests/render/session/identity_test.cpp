@@ -1,0 +1,110 @@
+// The image is the same bytes whatever drives the kernels: threads, batch sizes, policies, executors.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/render/session/render_once.h"
+
+namespace carpool::test {
+namespace {
+
+using render::Aov;
+using render::Executor;
+using render::RenderSettings;
+
+/// A room with everything that could make order matter: many materials, transparency, instances, mirrored nodes, point
+/// and area lights, and an open side to a sky.
+std::filesystem::path BusyScene(const std::filesystem::path& folder) {
+  SceneBuilder b;
+  const int wall = b.AddLambert({0.7, 0.6, 0.5});
+  const int lamp = b.AddLambert({0, 0, 0}, {1, 0.9, 0.8}, 8);
+  const int veil = b.AddMaterial({{"pbrMetallicRoughness", {{"baseColorFactor", {0.2, 0.5, 0.9, 0.4}}, {"metallicFactor", 0}}},
+                                  {"alphaMode", "BLEND"}, {"doubleSided", true}});
+  b.PlaceMesh(b.AddQuad({-2, -1, 2}, {2, -1, 2}, {2, -1, -2}, {-2, -1, -2}, wall));
+  b.PlaceMesh(b.AddQuad({-2, -1, -2}, {2, -1, -2}, {2, 2, -2}, {-2, 2, -2}, wall));
+  b.PlaceMesh(b.AddQuad({-0.5, 1.9, -0.5}, {0.5, 1.9, -0.5}, {0.5, 1.9, 0.5}, {-0.5, 1.9, 0.5}, lamp));
+  b.PlaceMesh(b.AddQuad({-1.2, -0.8, 0.6}, {0.2, -0.8, 0.6}, {0.2, 0.6, 0.6}, {-1.2, 0.6, 0.6}, veil));
+  for (int i = 0; i < 6; ++i) {
+    const int material = b.AddMaterial({{"pbrMetallicRoughness",
+                                         {{"baseColorFactor", {0.9, 0.15 * i, 0.3, 1}}, {"metallicFactor", i % 2},
+                                          {"roughnessFactor", 0.1 + 0.15 * i}}}});
+    const int sphere = b.AddSphere(0.3, 12, material, false);
+    b.AddNode({{"mesh", sphere}, {"translation", {-1.5 + 0.6 * i, -0.7, 0.1 * i}}});
+    b.AddNode({{"mesh", sphere}, {"translation", {-1.5 + 0.6 * i, 0.3, -1}}, {"scale", {-0.7, 1.2, 0.8}}});
+  }
+  b.json()["extensionsUsed"].push_back("KHR_lights_punctual");
+  b.json()["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "point"}, {"intensity", 3}}};
+  b.AddNode({{"translation", {1.5, 1, 1}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  b.AddCamera({0, 0.3, 4.5}, 0.7);
+  return b.Write(folder, "busy");
+}
+
+class Identity : public testing::Test {
+ protected:
+  RenderSettings Base() const {
+    RenderSettings s;
+    s.scene_path = BusyScene(folder_.path()).string();
+    s.width = 61;  // neither a multiple of a packet's 4 nor of a tile's 16
+    s.height = 43;
+    s.samples = 6;
+    s.threads = 1;
+    s.aovs = render::ParseAovs("all");
+    return s;
+  }
+  ScratchFolder folder_;
+};
+
+TEST_F(Identity, HoldsForThreadsBatchesPoliciesAndExecutors) {
+  const Rendered reference = RenderOnce(Base());
+  const std::string expected = PixelBytes(reference.image);
+  EXPECT_GT(MeanOf(reference.image, "G"), 0.01) << "the scene must not be black";
+
+  std::vector<std::pair<std::string, RenderSettings>> variants;
+  for (const int threads : {2, 8}) {
+    RenderSettings s = Base();
+    s.threads = threads;
+    variants.emplace_back(std::to_string(threads) + " threads", s);
+  }
+  for (const int batch : {8, 64, 4096}) {
+    RenderSettings s = Base();
+    s.threads = 2;
+    s.batch_items = batch;
+    variants.emplace_back("batches of " + std::to_string(batch), s);
+  }
+  for (const render::Policy policy : {render::Policy::deepest, render::Policy::fullest, render::Policy::oldest}) {
+    RenderSettings s = Base();
+    s.threads = 2;
+    s.policy = policy;
+    variants.emplace_back("policy " + std::string(render::Name(policy)), s);
+  }
+  for (const int threads : {1, 2, 8}) {
+    RenderSettings s = Base();
+    s.executor = Executor::megakernel;
+    s.threads = threads;
+    variants.emplace_back("megakernel on " + std::to_string(threads), s);
+  }
+  RenderSettings small_memory = Base();
+  small_memory.memory_mb = 1;
+  small_memory.threads = 2;
+  variants.emplace_back("1 MiB of path state", small_memory);
+
+  for (const auto& [name, settings] : variants) {
+    EXPECT_TRUE(PixelBytes(RenderOnce(settings).image) == expected) << name << " changes the image";
+  }
+}
+
+TEST_F(Identity, AnotherSeedIsAnotherImage) {
+  RenderSettings other = Base();
+  other.seed = 1;
+  EXPECT_FALSE(PixelBytes(RenderOnce(Base()).image) == PixelBytes(RenderOnce(other).image));
+}
+
+TEST_F(Identity, HoldsWithAPreviewInBetween) {
+  RenderSettings previewed = Base();
+  previewed.preview_path = (folder_.path() / "preview.png").string();
+  EXPECT_TRUE(PixelBytes(RenderOnce(Base()).image) == PixelBytes(RenderOnce(previewed).image));
+  EXPECT_TRUE(std::filesystem::exists(previewed.preview_path));
+}
+
+}  // namespace
+}  // namespace carpool::test
