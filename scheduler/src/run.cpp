@@ -61,8 +61,8 @@ struct Destination {
   RunCore* core;
 };
 
-// oneTBB is not instrumented for the thread sanitizer, which therefore cannot see that an enqueued
-// functor is handed over properly. These two functions tell it.
+// oneTBB is not instrumented for the thread sanitizer, which therefore cannot see that functors are
+// handed from thread to thread properly. These two functions tell it; elsewhere they are nothing.
 #ifdef CARPOOL_TSAN
 char tsan_tag;
 void hand_over() {
@@ -75,6 +75,14 @@ void receive() {
 void hand_over() {}
 void receive() {}
 #endif
+
+// Custody is the first member of a functor that oneTBB stores: its memory, too, is handed on.
+struct Custody {
+  Custody() { receive(); }
+  Custody(const Custody&) : Custody() {}
+  Custody& operator=(const Custody&) = delete;
+  ~Custody() { hand_over(); }
+};
 
 void serve_isolated(RunCore& core, bool searching) {
   // Isolated: a kernel that waits for a nested parallel_for must not pick up another worker's task
@@ -104,6 +112,7 @@ class Invitation {
   }
 
  private:
+  Custody custody_;  // first: made before and destroyed after the pointer
   std::shared_ptr<const Destination> to_;
 };
 
@@ -118,7 +127,13 @@ class ThreadedRun final : private Summoner {
     bool searching = false;
     do {
       do {
-        arena_.execute([&] { serve_isolated(core_, searching); });
+        hand_over();
+        arena_.execute([&] {  // by another thread, if the arena has no place for this one
+          receive();
+          serve_isolated(core_, searching);
+          hand_over();
+        });
+        receive();
         searching = true;
       } while (core_.gate->leave(true) == Gate::Left::stays);
       // Outside the arena: a thread asleep in there would be missing from every nested

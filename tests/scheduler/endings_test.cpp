@@ -151,40 +151,58 @@ TEST_P(EndingsTest, TheDeadlineEndsAnEndlessRun) {
   EXPECT_GE(std::chrono::steady_clock::now(), *with_deadline.deadline);
 }
 
-// One item becomes a million, though it was declared to stay one.
-void build_flood(carpool::Graph& graph, std::uint32_t& made) {
-  const auto stage = graph.add_stage<std::uint64_t>({.name = "flood", .bins = 3});
-  graph.set_kernel(stage, [&made, stage](const Batch<std::uint64_t>& batch, Emitter& out) {
-    for (const std::uint64_t item : batch.items) {
-      if (item == 0) {
-        for (std::uint32_t i = 1; i <= 1'000'000; ++i, ++made) {
-          out.emit(stage, i % 3, std::uint64_t{i});
-        }
-      }
-    }
-  });
-  graph.add_source({.name = "one"}, [stage](SourceContext&, Emitter& out) {
-    out.emit(stage, 0, std::uint64_t{0});
-    return SourceStatus::exhausted;
-  });
-}
+// One item becomes a million, though it was declared to stay one. Its children wait until all are
+// made, or the attempt has failed, so that they really are alive at once.
+class Flood {
+ public:
+  static constexpr std::uint32_t kItems = 1'000'000;
 
-TEST_P(EndingsTest, MoreThanTheDeclaredFanOutFails) {
+  Flood() {
+    const auto stage = graph.add_stage<std::uint64_t>({.name = "flood", .bins = 3});
+    graph.set_kernel(stage, [this, stage](const Batch<std::uint64_t>& batch, Emitter& out) {
+      if (batch.items.front() != 0) {
+        ended.wait(false);
+        return;
+      }
+      try {
+        for (; made < kItems; ++made) {
+          out.emit(stage, made % 3, std::uint64_t{1});
+        }
+      } catch (...) {
+        end();
+        throw;
+      }
+      end();
+    });
+    graph.add_source({.name = "one"}, [stage](SourceContext&, Emitter& out) {
+      out.emit(stage, 0, std::uint64_t{0});
+      return SourceStatus::exhausted;
+    });
+  }
+
   carpool::Graph graph;
   std::uint32_t made = 0;
-  build_flood(graph, made);
-  EXPECT_THROW(carpool::run(graph, options()), carpool::OverflowError);
-  EXPECT_LT(made, 1'000'000U);
+
+ private:
+  void end() {
+    ended = true;
+    ended.notify_all();
+  }
+  std::atomic<bool> ended{false};
+};
+
+TEST_P(EndingsTest, MoreThanTheDeclaredFanOutFails) {
+  Flood flood;
+  EXPECT_THROW(carpool::run(flood.graph, options()), carpool::OverflowError);
+  EXPECT_LT(flood.made, Flood::kItems);
 }
 
 TEST_P(EndingsTest, MoreThanTheDeclaredFanOutGrowsOnRequest) {
-  carpool::Graph graph;
-  std::uint32_t made = 0;
-  build_flood(graph, made);
+  Flood flood;
   carpool::RunOptions growing = options();
   growing.overflow = carpool::Overflow::grow;
-  const auto report = carpool::run(graph, growing);
-  EXPECT_EQ(report.stages[0].items, 1'000'001U);
+  const auto report = carpool::run(flood.graph, growing);
+  EXPECT_EQ(report.stages[0].items, Flood::kItems + 1U);
   EXPECT_GT(report.overflow_blocks, 0U);
   EXPECT_GT(report.peak_bytes, report.worst_case_bytes);
   EXPECT_FALSE(report.notes.empty());
