@@ -195,9 +195,9 @@ inline Float3 Normal(Float3 v) { return v * (1 / std::sqrt(Dot(v, v))); }
 struct Surface {
   BsdfTablesView tables;
   Row row;
-  float root_o, f90, through, through_m, through_b, spread;
+  float inverse_alpha, root_o, pdf_scale, f90, through, through_m, through_b, spread, natural_spread;
   Float3 f0, multi, diffuse;
-  float specular_weight, multi_weight, diffuse_weight, total_weight;
+  float specular_weight, multi_weight, diffuse_weight, total_weight, inverse_total;
 };
 
 inline float Passed(const Surface& s, Pair at) {
@@ -213,7 +213,9 @@ inline Surface Prepare(const BsdfTablesView& tables, const Params& p, Float3 wo)
   Surface s;
   s.tables = tables;
   s.row = FindRow(tables, p.roughness);
+  s.inverse_alpha = 1 / s.row.alpha;
   s.root_o = Root(wo, s.row.alpha);
+  s.pdf_scale = 0.5f / (wo.z + s.root_o);
   const float metallic = Clamp(p.metallic);
   const Float3 base = Clamp(p.base);
   const Pair at = LookUpPair(tables, s.row, std::max(wo.z, 0.0f));
@@ -235,6 +237,7 @@ inline Surface Prepare(const BsdfTablesView& tables, const Params& p, Float3 wo)
   if (metallic > 0) s.multi = FmaEach(Share(base, 1, s.row.average.m), metallic, s.multi);
   s.multi = s.multi * Divide(at.m, s.row.average.m);
   s.multi_weight = Sum(s.multi) * s.row.average.m;
+  s.natural_spread = s.row.log2_spread * std::numbers::ln2_v<float>;
   s.spread = 1 / PowerMinus1(s.row.log2_spread);
   const float largest = Largest(f0);
   s.through = 1 - largest;
@@ -244,6 +247,7 @@ inline Surface Prepare(const BsdfTablesView& tables, const Params& p, Float3 wo)
   s.diffuse = base * (Divide(Passed(s, at), passed) * (1 - metallic));
   s.diffuse_weight = Sum(s.diffuse) * passed;
   s.total_weight = s.specular_weight + s.multi_weight + s.diffuse_weight;
+  s.inverse_total = Divide(1, s.total_weight);
   return s;
 }
 
@@ -253,29 +257,29 @@ inline Value Evaluate(const Surface& s, Float3 wo, Float3 wi) {
   float pdf = 0;
   if (s.specular_weight > 0) {
     const Float3 half = wo + wi;
-    const float length2 = Dot(half, half), inverse = 1 / s.row.alpha, x = half.x * inverse, y = half.y * inverse;
-    const float ratio = Divide(length2, Fma(x, x, Fma(y, y, half.z * half.z))) * inverse;
+    const float length2 = Dot(half, half), inverse = s.inverse_alpha, x = half.x * inverse, y = half.y * inverse;
+    const float ratio = length2 / std::max(Fma(x, x, Fma(y, y, half.z * half.z)), 1e-37f) * inverse;
     const float distribution = ratio * ratio * (1 / kPiF);
     const float joint = Fma(wi.z, s.root_o, wo.z * Root(wi, s.row.alpha));
-    const float value = distribution * 0.5f * Divide(wi.z, joint);
+    const float value = distribution * (0.5f * wi.z / std::max(joint, 1e-37f));
     const float power = SchlickPower(std::sqrt(length2) * 0.5f);
     const Float3 fresnel{Fma(s.f90 - s.f0.x, power, s.f0.x), Fma(s.f90 - s.f0.y, power, s.f0.y), Fma(s.f90 - s.f0.z, power, s.f0.z)};
     f = fresnel * value;
-    pdf = s.specular_weight * (distribution * 0.5f / (wo.z + s.root_o));
+    pdf = s.specular_weight * s.pdf_scale * distribution;
   }
   if (s.multi_weight + s.diffuse_weight > 0) {
     const Pair at = LookUpPair(s.tables, s.row, wi.z);
     const float cosine = wi.z * (1 / kPiF);
     if (s.multi_weight > 0) {
       f = FmaEach(s.multi, cosine * at.m, f);
-      pdf = Fma(s.multi_weight, cosine / (Fma(wi.z, wi.z, s.spread) * s.row.log2_spread * std::numbers::ln2_v<float>), pdf);
+      pdf = Fma(s.multi_weight, cosine / (Fma(wi.z, wi.z, s.spread) * s.natural_spread), pdf);
     }
     if (s.diffuse_weight > 0) {
       f = FmaEach(s.diffuse, cosine * Passed(s, at), f);
       pdf = Fma(s.diffuse_weight, cosine, pdf);
     }
   }
-  return {f, Divide(pdf, s.total_weight)};
+  return {f, pdf * s.inverse_total};
 }
 
 inline Float3 SampleSpecular(const Surface& s, Float3 wo, Float2 u) {
@@ -305,7 +309,7 @@ inline Float3 SampleDiffuse(Float2 u) {
 
 inline Sampled SampleSurface(const Surface& s, Float3 wo, float u_lobe, Float2 u) {
   const float target = u_lobe * s.total_weight;
-  Float3 wi{0, 0, 0};
+  Float3 wi{0, 0, 1};
   if (target < s.specular_weight) {
     wi = SampleSpecular(s, wo, u);
   } else if (target < s.specular_weight + s.multi_weight) {
@@ -314,7 +318,7 @@ inline Sampled SampleSurface(const Surface& s, Float3 wo, float u_lobe, Float2 u
     wi = SampleDiffuse(u);
   }
   const Value value = Evaluate(s, wo, wi);
-  if (!(value.pdf > 0)) return {{0, 0, 1}, {0, 0, 0}, 0, false};
+  if (!(value.pdf > 0)) return {wi, {0, 0, 0}, 0, false};
   return {wi, value.f_cos * (1 / value.pdf), value.pdf, true};
 }
 

@@ -114,8 +114,7 @@ HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceP
   Bsdf<D> bsdf;
   bsdf.tables = tables;
   bsdf.row = FindAlbedoRow<D>(d, tables, params.roughness);
-  bsdf.alpha = bsdf.row.alpha;
-  bsdf.root_o = SmithRoot<D>(wo, bsdf.alpha);
+  bsdf.SetOutgoing(d, bsdf.row.alpha, wo);
   const Real<D> metallic = hn::Min(hn::Max(params.metallic, hn::Zero(d)), Splat(d, 1));
   const AlbedoAt<D> at_wo = LookUpAlbedo<D>(d, tables, bsdf.row, hn::Max(wo.z, hn::Zero(d)));
   PrepareLobes<D>(d, DielectricInterface<D>(d, params), Clamp01<D>(d, params.base_color), metallic, at_wo, bsdf);
@@ -127,10 +126,10 @@ HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceP
 template <class D>
 HWY_INLINE BsdfValue<D> EvaluateBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, const Vec3<D>& wi) {
   DirectionPair<D> pair = MakePair(d, wo, wi);
+  if (hn::AllFalse(d, pair.reflected)) return {Splat3(d, 0, 0, 0), hn::Zero(d)};
   const Real<D> users = bsdf.MultiScatterLobe<D>::weight + bsdf.DiffuseLobe<D>::weight;
-  const Mask<D> used = hn::And(pair.reflected, hn::Gt(users, hn::Zero(d)));
-  if (!hn::AllFalse(d, used)) {
-    pair.albedo = LookUpAlbedo<D>(d, bsdf.tables, bsdf.row, hn::IfThenElseZero(used, wi.z));
+  if (!hn::AllFalse(d, hn::Gt(users, hn::Zero(d)))) {
+    pair.albedo = LookUpAlbedo<D>(d, bsdf.tables, bsdf.row, pair.cosine);
   }
   return bsdf.Evaluate(d, pair);
 }
@@ -141,7 +140,7 @@ HWY_INLINE BsdfSample<D> SampleBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo,
   const BsdfValue<D> value = EvaluateBsdf<D>(d, bsdf, wo, wi);
   const Mask<D> valid = hn::Gt(value.pdf, hn::Zero(d));
   const Real<D> inverse = SafeDiv(d, Splat(d, 1), value.pdf);
-  return {Select<D>(valid, wi, Splat3(d, 0, 0, 1)), Scale<D>(value.f_cos, inverse), value.pdf, valid};
+  return {wi, Scale<D>(value.f_cos, inverse), value.pdf, valid};
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

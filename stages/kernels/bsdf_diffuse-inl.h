@@ -28,9 +28,8 @@ struct DiffuseLobe {
   HWY_INLINE Vec3<D> Sample(D d, const Vec3<D>&, const Vec2<D>& u) const { return SampleCosineHemisphere(d, u); }
 
   HWY_INLINE void Evaluate(D d, const DirectionPair<D>& pair, LobeSum<D>& sum) const {
-    const Mask<D> active = hn::And(pair.reflected, hn::Gt(weight, hn::Zero(d)));
-    if (hn::AllFalse(d, active)) return;
-    const Real<D> pdf = hn::IfThenElseZero(active, pair.wi.z * Splat(d, 1 / std::numbers::pi));
+    if (hn::AllFalse(d, hn::Gt(weight, hn::Zero(d)))) return;
+    const Real<D> pdf = pair.cosine * Splat(d, 1 / std::numbers::pi);
     sum.f_cos = MulAdd<D>(diffuse, pdf * sum.below * Passed(d, pair.albedo), sum.f_cos);
     sum.weighted_pdf = hn::MulAdd(weight, pdf, sum.weighted_pdf);
   }

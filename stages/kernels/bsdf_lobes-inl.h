@@ -26,6 +26,7 @@ template <class D>
 struct DirectionPair {
   Vec3<D> wo, wi;
   Mask<D> reflected;    // wi is above the surface, as wo is
+  Real<D> cosine;       // of wi, zero in other lanes
   Vec3<D> half;         // wo + wi, not normalised
   Real<D> length2;      // of `half`
   Real<D> half_cosine;  // between the half-vector and either direction
@@ -36,7 +37,14 @@ template <class D>
 HWY_INLINE DirectionPair<D> MakePair(D d, const Vec3<D>& wo, const Vec3<D>& wi) {
   const Vec3<D> half = Add<D>(wo, wi);
   const Real<D> length2 = Dot<D>(half, half);
-  return {wo,      wi, hn::Gt(wi.z, hn::Zero(d)), half, length2, hn::Sqrt(length2) * Splat(d, 0.5),
+  const Mask<D> reflected = hn::Gt(wi.z, hn::Zero(d));
+  return {wo,
+          wi,
+          reflected,
+          hn::IfThenElseZero(reflected, wi.z),
+          half,
+          length2,
+          hn::Sqrt(length2) * Splat(d, 0.5),
           {hn::Zero(d), hn::Zero(d)}};
 }
 
@@ -59,25 +67,26 @@ struct BsdfSample {
   Vec3<D> wi;
   Vec3<D> weight;  // f cos / pdf
   Real<D> pdf;
-  Mask<D> valid;   // otherwise the path ends: all other members are zero, wi is straight up
+  Mask<D> valid;   // otherwise the path ends: weight and pdf are zero, wi is some unit vector
 };
 
 /// The lobes of one material, from the top down. Sampling picks one lobe by weight; the density is always
 /// that of the whole mixture, so that light sampling and BSDF sampling agree on it.
 template <class D, template <class> class... Lobes>
 struct LobeSet : Lobes<D>... {
-  Real<D> total_weight;
+  Real<D> total_weight, inverse_total;
 
   /// Call once the lobes' weights are set.
   HWY_INLINE void SumWeights(D d) {
     total_weight = hn::Zero(d);
     ((total_weight = total_weight + Lobes<D>::weight), ...);
+    inverse_total = SafeDiv(d, Splat(d, 1), total_weight);
   }
 
   HWY_INLINE BsdfValue<D> Evaluate(D d, const DirectionPair<D>& pair) const {
     LobeSum<D> sum{Splat3(d, 0, 0, 0), hn::Zero(d), Splat(d, 1)};
     (Lobes<D>::Evaluate(d, pair, sum), ...);
-    return {sum.f_cos, SafeDiv(d, sum.weighted_pdf, total_weight)};
+    return {sum.f_cos, sum.weighted_pdf * inverse_total};
   }
 
   /// A lane's lobe is the first whose running sum of weights exceeds u_lobe times their total. As
@@ -86,7 +95,7 @@ struct LobeSet : Lobes<D>... {
   HWY_INLINE Vec3<D> Sample(D d, const Vec3<D>& wo, Real<D> u_lobe, const Vec2<D>& u) const {
     const Real<D> target = u_lobe * total_weight;
     Real<D> running = hn::Zero(d);
-    Vec3<D> wi = Splat3(d, 0, 0, 0);
+    Vec3<D> wi = Splat3(d, 0, 0, 1);
     (SampleIfChosen<Lobes<D>>(d, target, running, wo, u, wi), ...);
     return wi;
   }

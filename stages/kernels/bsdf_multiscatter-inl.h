@@ -23,13 +23,15 @@ namespace carpool::stages::HWY_NAMESPACE {
 template <class D>
 struct MultiScatterLobe {
   Real<D> weight;
-  Vec3<D> multi;        // share M(wo) / M_avg
-  Real<D> log2_spread;  // log2(1 + 1 / b)
-  Real<D> spread;       // b
+  Vec3<D> multi;           // share M(wo) / M_avg
+  Real<D> log2_spread;     // log2(1 + 1 / b)
+  Real<D> natural_spread;  // log(1 + 1 / b)
+  Real<D> spread;          // b
 
   /// 1 / b from its logarithm by the function that Sample inverts, so that both agree to the last bits.
   HWY_INLINE void SetSpread(D d, Real<D> log2) {
     log2_spread = log2;
+    natural_spread = log2 * Splat(d, std::numbers::ln2);
     spread = Splat(d, 1) / Exp2Minus1(d, log2);
   }
 
@@ -43,11 +45,10 @@ struct MultiScatterLobe {
   }
 
   HWY_INLINE void Evaluate(D d, const DirectionPair<D>& pair, LobeSum<D>& sum) const {
-    const Mask<D> active = hn::And(pair.reflected, hn::Gt(weight, hn::Zero(d)));
-    if (hn::AllFalse(d, active)) return;
-    const Real<D> cosine = hn::IfThenElseZero(active, pair.wi.z * Splat(d, 1 / std::numbers::pi));
+    if (hn::AllFalse(d, hn::Gt(weight, hn::Zero(d)))) return;
+    const Real<D> cosine = pair.cosine * Splat(d, 1 / std::numbers::pi);
     sum.f_cos = MulAdd<D>(multi, cosine * sum.below * pair.albedo.m, sum.f_cos);
-    const Real<D> mass = hn::MulAdd(pair.wi.z, pair.wi.z, spread) * log2_spread * Splat(d, std::numbers::ln2);
+    const Real<D> mass = hn::MulAdd(pair.cosine, pair.cosine, spread) * natural_spread;
     sum.weighted_pdf = hn::MulAdd(weight, cosine / mass, sum.weighted_pdf);
   }
 };

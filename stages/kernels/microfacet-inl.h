@@ -25,31 +25,32 @@ HWY_INLINE Real<D> SmithRoot(const Vec3<D>& w, Real<D> alpha) {
   return hn::Sqrt(hn::MulAdd(alpha * alpha, across, w.z * w.z));
 }
 
+/// The smallest divisor: far below any that matters, above float's denormals. It stands for 0 / 0 = 0.
+constexpr double kTinyDivisor = 1e-37;
+
 /// D(h) for a half-vector of any length (Walter et al. 2007, as ((x/a)^2 + (y/a)^2 + z^2)^-2 / (pi a^2));
 /// 0 for a half-vector too short to have a direction.
 template <class D>
-HWY_INLINE Real<D> GgxDistribution(D d, const Vec3<D>& half, Real<D> length2, Real<D> alpha) {
-  const Real<D> inverse_alpha = Splat(d, 1) / alpha;
+HWY_INLINE Real<D> GgxDistribution(D d, const Vec3<D>& half, Real<D> length2, Real<D> inverse_alpha) {
   const Real<D> x = half.x * inverse_alpha;
   const Real<D> y = half.y * inverse_alpha;
   const Real<D> q = hn::MulAdd(x, x, hn::MulAdd(y, y, half.z * half.z));
-  const Real<D> ratio = SafeDiv(d, length2, q) * inverse_alpha;
+  const Real<D> ratio = length2 / hn::Max(q, Splat(d, kTinyDivisor)) * inverse_alpha;
   return ratio * ratio * Splat(d, 1 / std::numbers::pi);
 }
 
-/// Density of `wi` when its half-vector is drawn by SampleVisibleNormal: G1(wo) D(h) / (4 wo.z).
+/// G1(wo) / (4 wo.z): times D(h), the density of `wi` when its half-vector is drawn by SampleVisibleNormal.
 template <class D>
-HWY_INLINE Real<D> VisibleNormalPdf(D d, const Vec3<D>& wo, Real<D> root_o, Real<D> distribution) {
-  return distribution * Splat(d, 0.5) / (wo.z + root_o);
+HWY_INLINE Real<D> VisibleNormalScale(D d, const Vec3<D>& wo, Real<D> root_o) {
+  return Splat(d, 0.5) / (wo.z + root_o);
 }
 
-/// D G2 / (4 wo.z), the microfacet BRDF times wi.z without its Fresnel term; G2 is Smith's
+/// G2 / (4 wo.z): times D(h), the microfacet BRDF times wi.z >= 0 without its Fresnel term; G2 is Smith's
 /// height-correlated shadowing (Heitz 2014, eq. 99).
 template <class D>
-HWY_INLINE Real<D> MicrofacetCosine(D d, const Vec3<D>& wo, const Vec3<D>& wi, Real<D> root_o, Real<D> root_i,
-                                    Real<D> distribution) {
-  const Real<D> joint = hn::MulAdd(wi.z, root_o, wo.z * root_i);
-  return distribution * Splat(d, 0.5) * SafeDiv(d, wi.z, joint);
+HWY_INLINE Real<D> MicrofacetScale(D d, const Vec3<D>& wo, Real<D> cosine_i, Real<D> root_o, Real<D> root_i) {
+  const Real<D> joint = hn::MulAdd(cosine_i, root_o, wo.z * root_i);
+  return Splat(d, 0.5) * cosine_i / hn::Max(joint, Splat(d, kTinyDivisor));
 }
 
 /// A microfacet normal as seen from `wo`, unit length (Dupuy and Benyoub 2023, "Sampling Visible GGX

@@ -80,10 +80,10 @@ Columns RunVisible(double alpha_value, const tests::Direction& from, const Colum
     const Vec3<D> normal = SampleVisibleNormal(d, wo, alpha, Vec2<D>{LoadColumn(d, u[0], i), LoadColumn(d, u[1], i)});
     const Vec3<D> wi = Reflect(wo, normal);
     const Real<D> root_o = SmithRoot(wo, alpha), root_i = SmithRoot(wi, alpha);
-    const Real<D> one = Splat(d, 1);
-    const Real<D> ratio = MicrofacetCosine(d, wo, wi, root_o, root_i, one) / VisibleNormalPdf(d, wo, root_o, one);
+    const Real<D> cosine = hn::Max(wi.z, hn::Zero(d));
+    const Real<D> ratio = MicrofacetScale(d, wo, cosine, root_o, root_i) / VisibleNormalScale(d, wo, root_o);
     StoreVector(d, wi, out, tests::kVisibleX, i);
-    StoreColumn(d, hn::IfThenElseZero(hn::Gt(wi.z, hn::Zero(d)), ratio), out[tests::kVisibleWeight], i);
+    StoreColumn(d, ratio, out[tests::kVisibleWeight], i);
   }
   return out;
 }
@@ -97,8 +97,8 @@ std::vector<double> RunVisiblePdf(double alpha_value, const tests::Direction& fr
   const Real<D> root_o = SmithRoot(wo, alpha);
   for (size_t i = 0; i < out.size(); i += hn::Lanes(d)) {
     const DirectionPair<D> pair = MakePair(d, wo, LoadDirection(d, directions, 0, i));
-    const Real<D> distribution = GgxDistribution(d, pair.half, pair.length2, alpha);
-    const Real<D> pdf = VisibleNormalPdf(d, wo, root_o, distribution);
+    const Real<D> distribution = GgxDistribution(d, pair.half, pair.length2, Splat(d, 1) / alpha);
+    const Real<D> pdf = VisibleNormalScale(d, wo, root_o) * distribution;
     StoreColumn(d, hn::IfThenElseZero(hn::Gt(pair.half.z, hn::Zero(d)), pdf), out, i);
   }
   return out;
