@@ -39,7 +39,10 @@ void CountMeshes(const Document& document, SceneSummary& summary) {
 std::string Line(const char* label, const std::string& text) {
   char buffer[24];
   std::snprintf(buffer, sizeof buffer, "%-15s", label);
-  return buffer + text + "\n";
+  std::string line = buffer + text;
+  for (char& c : line)
+    c = static_cast<unsigned char>(c) < ' ' ? '?' : c;  // names may hold anything
+  return line + "\n";
 }
 
 std::string Line(const char* label, uint64_t number) {

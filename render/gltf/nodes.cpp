@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 
 #include "render/gltf/accessors.h"
 #include "render/gltf/uri.h"
@@ -220,12 +221,14 @@ class Placer {
  private:
   /// A skinned mesh stands where its joints are; the transform of its own node does not count.
   void PlaceSkinned(int node, int mesh, int skin, Deform& deform) {
-    Vec3 anchor;
-    deform.joints = ReadJoints(document_, tree_, skin, anchor);
+    const auto [found, is_new] = poses_.try_emplace(skin);
+    Pose& pose = found->second;
+    if (is_new) pose.joints = ReadJoints(document_, tree_, skin, pose.anchor);
+    deform.joints = pose.joints;
     const int entry = geometry_.AddMesh(mesh, skin, deform);
     if (entry == kNone) return;
     Affine world = kIdentity;
-    for (int axis = 0; axis < 3; ++axis) world[axis * 4 + 3] = anchor[axis];
+    for (int axis = 0; axis < 3; ++axis) world[axis * 4 + 3] = pose.anchor[axis];
     Place(node, entry, world);
   }
 
@@ -236,9 +239,15 @@ class Placer {
     geometry_.AddInstance({mesh, node + 1, world});
   }
 
+  struct Pose {
+    std::vector<Affine> joints;
+    Vec3 anchor = {0, 0, 0};
+  };
+
   Document& document_;
   const NodeTree& tree_;
   GeometryBuilder& geometry_;
+  std::map<int, Pose> poses_;  // per skin, which many nodes may share
 };
 
 }  // namespace
