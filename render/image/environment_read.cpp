@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -43,6 +44,19 @@ bool Sanitize(std::span<float, 3> texel) {
     channel = std::max(channel, 0.0f);
   }
   return changed;
+}
+
+/// The matrix to Rec.709, unless none is needed. Primaries that make no sense are ignored, because
+/// a wrong hue is better than no picture.
+std::optional<Matrix3> ConversionOf(const Primaries& primaries, const std::string& where,
+                                    const WarningSink& warn) {
+  if (primaries.IsNear(Primaries{})) return {};
+  try {
+    return ToRec709(primaries);
+  } catch (const std::domain_error& error) {
+    if (warn) warn(where + ": " + error.what() + "; Rec.709 is assumed");
+    return {};
+  }
 }
 
 /// True if the colour left the gamut.
@@ -91,18 +105,17 @@ void CheckEnvironmentSize(int64_t width, int64_t height, const std::string& wher
 }
 
 EnvironmentMap ReadEnvironment(const std::filesystem::path& path, const WarningSink& warn) {
-  const std::string where = path.string();
-  RawEnvironment raw = ReadRaw(ReadWholeFile(path), where);
+  return DecodeEnvironment(ReadWholeFile(path), path.string(), warn);
+}
+
+EnvironmentMap DecodeEnvironment(std::span<const std::byte> bytes, const std::string& where,
+                                 const WarningSink& warn) {
+  RawEnvironment raw = ReadRaw(bytes, where);
   EnvironmentMap map{raw.width, raw.height, std::move(raw.rgb)};
   map.rejected_texels = CountChanged(map.rgb, Sanitize);
-  if (!raw.primaries.IsNear(Primaries{})) {
-    try {
-      const Matrix3 matrix = ToRec709(raw.primaries);
-      map.clamped_texels =
-          CountChanged(map.rgb, [&](std::span<float, 3> texel) { return Convert(matrix, texel); });
-    } catch (const std::domain_error& error) {
-      throw InputError(where, error.what());
-    }
+  if (const auto matrix = ConversionOf(raw.primaries, where, warn)) {
+    map.clamped_texels =
+        CountChanged(map.rgb, [&](std::span<float, 3> texel) { return Convert(*matrix, texel); });
   }
   Warn(map, where, warn);
   return map;

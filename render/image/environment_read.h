@@ -1,8 +1,11 @@
 // Reads lat-long environment maps from Radiance (.hdr) and OpenEXR (.exr) files.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "render/base/error.h"
@@ -23,9 +26,13 @@ struct EnvironmentMap {
 };
 
 /// The format is told by the contents. Channels R, G, B, or Y for grey, are read, others ignored;
-/// primaries that the file names are converted to Rec.709; Radiance's EXPOSURE is divided out.
-/// Rejected and clamped texels are counted and warned of. Throws InputError for anything that
+/// sensible primaries that the file names are converted to Rec.709; Radiance's EXPOSURE is divided
+/// out. Rejected and clamped texels are counted and warned of. Throws InputError for anything that
 /// cannot be read in full.
 EnvironmentMap ReadEnvironment(const std::filesystem::path& path, const WarningSink& warn);
+
+/// The same for a file in memory; `where` names it in errors and warnings.
+EnvironmentMap DecodeEnvironment(std::span<const std::byte> bytes, const std::string& where,
+                                 const WarningSink& warn);
 
 }  // namespace carpool::render

@@ -1,12 +1,15 @@
 // See exr_load.h.
 #include "render/image/exr_load.h"
 
+#include <Iex.h>
 #include <ImathBox.h>
 #include <ImfChannelList.h>
 #include <ImfVersion.h>
 #include <ImfXdr.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <mutex>
 
 #include "render/base/error.h"
@@ -25,6 +28,37 @@ void SetGlobalLimits() {
   });
 }
 
+/// Takes the text up to the next zero byte off the front.
+std::string TakeText(std::span<const std::byte>& rest) {
+  const auto end = std::ranges::find(rest, std::byte{0});
+  if (end == rest.end()) throw IEX_NAMESPACE::InputExc("the header ends too early");
+  std::string text;
+  for (auto it = rest.begin(); it != end; ++it) text += static_cast<char>(*it);
+  rest = rest.subspan(text.size() + 1);
+  return text;
+}
+
+/// Takes one header off the front: name, type, length and data of attributes up to an empty name.
+void TakeHeader(std::span<const std::byte>& rest) {
+  while (!TakeText(rest).empty()) {
+    TakeText(rest);  // the type
+    uint32_t length = 0;
+    if (rest.size() < sizeof(length)) throw IEX_NAMESPACE::InputExc("the header ends too early");
+    std::memcpy(&length, rest.data(), sizeof(length));
+    rest = rest.subspan(sizeof(length));
+    if (length > rest.size()) throw IEX_NAMESPACE::InputExc("an attribute is longer than the file");
+    rest = rest.subspan(length);
+  }
+}
+
+/// OpenEXR allocates what an attribute claims before it reads: checks that all claims are within
+/// the file. Files of several parts have several headers, up to an empty one.
+void CheckAttributeLengths(std::span<const std::byte> headers, bool several) {
+  do {
+    TakeHeader(headers);
+  } while (several && !headers.empty() && headers.front() != std::byte{0});
+}
+
 /// The header of the first part, read ahead of Imf::InputFile, which allocates as it opens.
 Imf::Header ReadFirstHeader(std::span<const std::byte> bytes) {
   ExrMemoryInput stream(bytes);
@@ -33,6 +67,7 @@ Imf::Header ReadFirstHeader(std::span<const std::byte> bytes) {
   Imf::Xdr::read<Imf::StreamIO>(stream, version);
   if (magic != Imf::MAGIC) throw IEX_NAMESPACE::InputExc("not an EXR file");
   if (Imf::isNonImage(version)) throw IEX_NAMESPACE::InputExc("deep images cannot be read");
+  CheckAttributeLengths(bytes.subspan(stream.tellg()), Imf::isMultiPart(version));
   Imf::Header header;
   header.readFrom(stream, version);
   return header;

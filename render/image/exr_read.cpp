@@ -69,9 +69,12 @@ const std::vector<uint32_t>* ExrImage::FindIds(const std::string& name) const {
 }
 
 ExrImage ReadExr(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = ReadWholeFile(path);
+  return DecodeExr(ReadWholeFile(path), path.string());
+}
+
+ExrImage DecodeExr(std::span<const std::byte> bytes, const std::string& where) {
   ExrImage image;
-  WithExrFile(bytes, path.string(), [&](Imf::InputFile& file, ExrSize size) {
+  WithExrFile(bytes, where, [&](Imf::InputFile& file, ExrSize size) {
     image.width = size.width;
     image.height = size.height;
     CollectAttributes(file.header(), image.attributes);

@@ -1,8 +1,10 @@
 // Reads multi-channel EXR images back: for merge, compare and the tests.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -31,5 +33,8 @@ struct ExrImage {
 /// Reads the first part, scan lines or the full-size level of tiles; half becomes float; subsampled
 /// channels are refused. Throws InputError for anything that cannot be read in full.
 ExrImage ReadExr(const std::filesystem::path& path);
+
+/// The same for a file in memory; `where` names it in errors.
+ExrImage DecodeExr(std::span<const std::byte> bytes, const std::string& where);
 
 }  // namespace carpool::render

@@ -83,7 +83,8 @@ Header ReadHeader(Reader& reader) {
       if (!(header.exposure > 1e-30 && header.exposure < 1e30)) reader.Fail("EXPOSURE is not sane");
     } else if (const auto xy = ValueOf(line, "PRIMARIES"); xy) {
       if (!ParseNumbers(*xy, p)) reader.Fail("PRIMARIES needs eight numbers");
-      header.primaries = {{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}};
+      const bool known = std::ranges::any_of(p, [](double number) { return number != 0; });
+      if (known) header.primaries = {{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}};
     }
   }
   return header;

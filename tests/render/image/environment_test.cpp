@@ -28,20 +28,15 @@ struct Result {
   std::string error;
 };
 
-Result ReadFile(const std::filesystem::path& path) {
+Result Read(std::span<const std::byte> bytes) {
   Result result;
   try {
-    result.map =
-        ReadEnvironment(path, [&](const std::string& line) { result.warnings += line + "\n"; });
+    result.map = DecodeEnvironment(
+        bytes, "env", [&](const std::string& line) { result.warnings += line + "\n"; });
   } catch (const InputError& error) {
     result.error = error.what();
   }
   return result;
-}
-Result Read(std::span<const std::byte> bytes) {
-  const TemporaryFolder folder;
-  WriteBytes(folder / "env", bytes);
-  return ReadFile(folder / "env");
 }
 
 /// A Radiance file of `pixels` behind a header with extra lines.
@@ -87,6 +82,16 @@ TEST(Radiance, NewRunsPerChannel) {
 TEST(Radiance, ExposureIsDividedOut) {
   const Result out = Read(Hdr("-Y 1 +X 1", kOne, "EXPOSURE=2\nEXPOSURE= 4.0\n"));
   EXPECT_EQ(out.map.rgb, (Floats{1.0f / 8, 0.5f / 8, 0.25f / 8}));
+}
+
+TEST(Radiance, SenselessPrimariesAreIgnoredWithAWarning) {
+  const Result out = Read(Hdr("-Y 1 +X 1", kOne, "PRIMARIES=.3 .3 .3 .3 .3 .3 .3 .3\n"));
+  EXPECT_EQ(out.map.rgb, (Floats{1, 0.5f, 0.25f}));
+  EXPECT_NE(out.warnings.find("Rec.709 is assumed"), std::string::npos);
+  // Zeros are how some programs write "unknown".
+  const Result zeros = Read(Hdr("-Y 1 +X 1", kOne, "PRIMARIES=0 0 0 0 0 0 0 0\n"));
+  EXPECT_EQ(zeros.map.rgb, (Floats{1, 0.5f, 0.25f}));
+  EXPECT_EQ(zeros.warnings, "");
 }
 
 /// Red of each texel of a 3 x 2 picture whose file order is 1, 2, 3, 4, 5, 6.
@@ -273,14 +278,22 @@ TEST(ExrEnvironment, BadFilesAreNamed) {
   ExrMaker cube({"R", "G", "B"}, Imf::FLOAT, kTwoByOne);
   Imf::addEnvmap(cube.Header(), Imf::ENVMAP_CUBE);
   EXPECT_NE(Read(cube.Make({1, 2, 3, 4, 5, 6})).error.find("cube map"), std::string::npos);
-  ExrMaker flat({"R", "G", "B"}, Imf::FLOAT, kTwoByOne);
-  Imf::addChromaticities(flat.Header(),
-                         Imf::Chromaticities({0.3f, 0.3f}, {0.3f, 0.3f}, {0.3f, 0.3f}));
-  EXPECT_NE(Read(flat.Make({1, 2, 3, 4, 5, 6})).error, "");
   ExrMaker good({"R", "G", "B"}, Imf::FLOAT, kTwoByOne);
   const Bytes whole = good.Make({1, 2, 3, 4, 5, 6});
   for (size_t count = 0; count < whole.size(); ++count) {
     EXPECT_NE(Read(std::span(whole).first(count)).error, "") << count;
+  }
+}
+
+TEST(Environment, FilesAreReadByPath) {
+  const TemporaryFolder folder;
+  WriteBytes(folder / "env.hdr", Hdr("-Y 1 +X 1", kOne));
+  EXPECT_EQ(ReadEnvironment(folder / "env.hdr", {}).rgb, (Floats{1, 0.5f, 0.25f}));
+  try {
+    ReadEnvironment(folder / "missing.hdr", {});
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("missing.hdr: no such file"), std::string::npos);
   }
 }
 

@@ -119,8 +119,7 @@ TEST(Exr, EveryTruncationIsAnInputError) {
   WriteExr(folder / "a.exr", kWidth, kHeight, planes.Views(), planes.attributes);
   const Bytes whole = ReadBytes(folder / "a.exr");
   for (size_t count = 0; count < whole.size(); count += 37) {
-    WriteBytes(folder / "b.exr", std::span(whole).first(count));
-    EXPECT_THROW(ReadExr(folder / "b.exr"), InputError) << count;
+    EXPECT_THROW(DecodeExr(std::span(whole).first(count), "b.exr"), InputError) << count;
   }
   EXPECT_THROW(ReadExr(folder / "nothing.exr"), InputError);
   EXPECT_THROW(ReadExr(folder.Path()), InputError);
