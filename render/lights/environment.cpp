@@ -1,6 +1,10 @@
 // Builds the integer selection tables of an environment map.
 #include "render/lights/environment.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -34,6 +38,19 @@ void Apportion(std::span<double> weights, int32_t* cdf) {
     if (weights[i] > 0) given = passed + static_cast<int32_t>(std::lround(rest * (sum / total)));
     weights[i] = static_cast<double>(given - cdf[i]) / stages::kEnvironmentMass;
   }
+}
+
+/// Fills the guide of a table; see `stages::GuideBits`.
+void MakeGuide(std::span<const int32_t> cdf, int32_t* guide) {
+  const int32_t count = static_cast<int32_t>(cdf.size());
+  const int32_t cells = stages::GuideSize(count) - 1, cell = stages::kEnvironmentMass / cells;
+  int32_t entry = 0;
+  const auto advance = [&](int32_t number) {
+    while (entry + 1 < count && cdf[entry + 1] <= number) ++entry;
+    return entry;
+  };
+  for (int32_t k = 0; k < cells; ++k) guide[k] = advance(k * cell);
+  guide[cells] = advance(stages::kEnvironmentMass - 1);
 }
 
 EnvironmentReport Sanitise(std::vector<float>& rgb) {
@@ -70,6 +87,15 @@ double RowWeights(const float* rgb, double sin_theta, std::span<double> weights)
   return sum;
 }
 
+/// Calls f(row, scratch of `width` numbers) for every row, in parallel.
+template <class F>
+void EachRow(size_t height, size_t width, const F& f) {
+  tbb::parallel_for(tbb::blocked_range<size_t>(0, height, 16), [&](const auto& range) {
+    std::vector<double> scratch(width);
+    for (size_t y = range.begin(); y < range.end(); ++y) f(y, std::span<double>(scratch));
+  });
+}
+
 }  // namespace
 
 EnvironmentReport BuildEnvironment(stages::Environment& environment, int width, int height,
@@ -84,21 +110,26 @@ EnvironmentReport BuildEnvironment(stages::Environment& environment, int width, 
   built.row_cdf.resize(h);
   built.column_cdf.resize(w * h);
 
-  std::vector<double> rows(h), columns(w);
-  for (size_t y = 0; y < h; ++y) {
-    rows[y] = RowWeights(&rgb[3 * w * y], SinTheta(static_cast<int>(y), height), columns);
-  }
+  built.row_guide.resize(stages::GuideSize(height));
+  built.column_guide.resize(h * stages::GuideSize(width));
+
+  std::vector<double> rows(h);
+  const auto weigh = [&](size_t y, std::span<double> columns) {
+    return RowWeights(&rgb[3 * w * y], SinTheta(static_cast<int>(y), height), columns);
+  };
+  EachRow(h, w, [&](size_t y, std::span<double> columns) { rows[y] = weigh(y, columns); });
   Apportion(rows, built.row_cdf.data());
-  for (size_t y = 0; y < h; ++y) {
-    RowWeights(&rgb[3 * w * y], SinTheta(static_cast<int>(y), height), columns);
-    Apportion(columns, &built.column_cdf[w * y]);
+  MakeGuide(built.row_cdf, built.row_guide.data());
+  EachRow(h, w, [&](size_t y, std::span<double> columns) {
+    weigh(y, columns);
+    const std::span<int32_t> cdf(&built.column_cdf[w * y], w);
+    Apportion(columns, cdf.data());
+    MakeGuide(cdf, &built.column_guide[y * stages::GuideSize(width)]);
     for (size_t x = 0; x < w; ++x) {
-      const float* from = &rgb[3 * (w * y + x)];
-      float* to = &built.texels[4 * (w * y + x)];
-      for (int c = 0; c < 3; ++c) to[c] = from[c];
-      to[3] = static_cast<float>(rows[y] * columns[x]);
+      float* const texel = std::copy_n(&rgb[3 * (w * y + x)], 3, &built.texels[4 * (w * y + x)]);
+      *texel = static_cast<float>(rows[y] * columns[x]);
     }
-  }
+  });
   environment = std::move(built);
   return report;
 }

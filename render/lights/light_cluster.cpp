@@ -13,7 +13,8 @@ constexpr double kPi = std::numbers::pi;
 double Dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 double Distance(const Point3& a, const Point3& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+  const Point3 d = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  return std::sqrt(Dot(d, d));
 }
 
 struct Cone {

@@ -201,11 +201,9 @@ class TreeBuilder {
     }
     // Outward, past the rounding of the centre and of the radius itself.
     n.radius = static_cast<float>(c.radius > 0 ? c.radius * (1 + 1e-6) + largest * 2e-7 : 0);
-    n.power = static_cast<float>(c.power);
+    n.signed_power = static_cast<float>(c.two_sided ? -c.power : c.power);
     n.cos_theta_o = static_cast<float>(std::cos(c.theta_o));
-    n.sin_theta_o = static_cast<float>(std::sin(c.theta_o));
     n.cos_theta_e = static_cast<float>(std::cos(std::min(c.theta_e, kPi)));
-    n.two_sided = c.two_sided;
     n.child_or_light = child_or_light;
     n.parent = parent;
   }

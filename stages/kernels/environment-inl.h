@@ -15,6 +15,7 @@
 #endif
 
 #include "stages/kernels/light_math-inl.h"
+#include "stages/simd/quads-inl.h"
 #include "stages/tables/light_view.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -101,54 +102,46 @@ HWY_INLINE EnvironmentTaps<D> TapsAt(D d, const EnvironmentView& view,
           gs * gt, fs * gt, gs * ft, fs * ft};
 }
 
-/// The bilinear value of channel 0..3 of the texels.
+/// The bilinear value of all four channels of the texels: radiance, and selection probability in w.
 template <class D>
-HWY_INLINE Real<D> Interpolate(D d, const EnvironmentView& view, const EnvironmentTaps<D>& taps,
-                               int32_t channel) {
-  const float* HWY_RESTRICT base = view.texels + channel;
-  return hn::MulAdd(taps.w00, GatherReal(d, base, taps.at00),
-                    hn::MulAdd(taps.w10, GatherReal(d, base, taps.at10),
-                               hn::MulAdd(taps.w01, GatherReal(d, base, taps.at01),
-                                          taps.w11 * GatherReal(d, base, taps.at11))));
-}
-template <class D>
-HWY_INLINE Vec3<D> InterpolateRadiance(D d, const EnvironmentView& view,
-                                       const EnvironmentTaps<D>& taps) {
-  return {Interpolate(d, view, taps, 0), Interpolate(d, view, taps, 1),
-          Interpolate(d, view, taps, 2)};
+HWY_INLINE Quad<D> Interpolate(D d, const EnvironmentView& view, const EnvironmentTaps<D>& taps) {
+  const Quad<D> a = GatherQuad(d, view.texels, taps.at00), b = GatherQuad(d, view.texels, taps.at10),
+                c = GatherQuad(d, view.texels, taps.at01), e = GatherQuad(d, view.texels, taps.at11);
+  const auto blend = [&](Real<D> a, Real<D> b, Real<D> c, Real<D> e) HWY_ATTR {
+    return hn::MulAdd(taps.w00, a, hn::MulAdd(taps.w10, b, hn::MulAdd(taps.w01, c, taps.w11 * e)));
+  };
+  return {blend(a.x, b.x, c.x, e.x), blend(a.y, b.y, c.y, e.y), blend(a.z, b.z, c.z, e.z),
+          blend(a.w, b.w, c.w, e.w)};
 }
 /// d(u, v) covers 2 pi^2 sin(theta) of solid angle. The floor only spares the very poles a 1/0.
 template <class D>
-HWY_INLINE Real<D> InterpolatePdf(D d, const EnvironmentView& view, const EnvironmentTaps<D>& taps,
-                                  Real<D> sin_theta) {
+HWY_INLINE EnvironmentValue<D> ValueAt(D d, const EnvironmentView& view,
+                                       const EnvironmentPlace<D>& place) {
+  const Quad<D> value = Interpolate(d, view, TapsAt(d, view, place));
   const double texels = static_cast<double>(view.width) * view.height;
-  return Interpolate(d, view, taps, 3) * Splat(d, texels / (2 * kPi * kPi)) /
-         hn::Max(sin_theta, Splat(d, 1e-7));
+  const Real<D> pdf = value.w * Splat(d, texels / (2 * kPi * kPi)) /
+                      hn::Max(place.sin_theta, Splat(d, 1e-7));
+  return {{value.x, value.y, value.z}, pdf};
+}
+
+/// Both radiance and density, for the price of one look-up.
+template <class D>
+HWY_INLINE EnvironmentValue<D> LookUpEnvironment(D d, const EnvironmentView& view,
+                                                 const Vec3<D>& dir) {
+  if (view.width == 0) return {Splat3(d, 0, 0, 0), hn::Zero(d)};
+  return ValueAt(d, view, PlaceOfDirection(d, view, dir));
 }
 
 /// Radiance that arrives from `dir`, which has unit length.
 template <class D>
 HWY_INLINE Vec3<D> EnvironmentRadiance(D d, const EnvironmentView& view, const Vec3<D>& dir) {
-  if (view.width == 0) return Splat3(d, 0, 0, 0);
-  return InterpolateRadiance(d, view, TapsAt(d, view, PlaceOfDirection(d, view, dir)));
+  return LookUpEnvironment(d, view, dir).radiance;
 }
 
 /// Density per solid angle with which `SampleEnvironment` returns `dir`.
 template <class D>
 HWY_INLINE Real<D> EnvironmentPdf(D d, const EnvironmentView& view, const Vec3<D>& dir) {
-  if (view.width == 0) return hn::Zero(d);
-  const EnvironmentPlace<D> place = PlaceOfDirection(d, view, dir);
-  return InterpolatePdf(d, view, TapsAt(d, view, place), place.sin_theta);
-}
-
-/// Both of the above for the price of one look-up.
-template <class D>
-HWY_INLINE EnvironmentValue<D> LookUpEnvironment(D d, const EnvironmentView& view,
-                                                 const Vec3<D>& dir) {
-  if (view.width == 0) return {Splat3(d, 0, 0, 0), hn::Zero(d)};
-  const EnvironmentPlace<D> place = PlaceOfDirection(d, view, dir);
-  const EnvironmentTaps<D> taps = TapsAt(d, view, place);
-  return {InterpolateRadiance(d, view, taps), InterpolatePdf(d, view, taps, place.sin_theta)};
+  return LookUpEnvironment(d, view, dir).pdf;
 }
 
 /// An entry of an exclusive cumulative table, and where within the entry's mass the number fell: in (0, 1).
@@ -158,33 +151,40 @@ struct TableEntry {
   Real<D> within;
 };
 
-/// The last of `count` entries, from table[start], whose cumulative mass is not above u's cell: entries
-/// without mass share their successor's (or the end's) and are never the last.
+/// Many tables of `count` entries each, one behind the other, and their guides.
+struct SelectionTables {
+  const int32_t* HWY_RESTRICT cdf;
+  const int32_t* HWY_RESTRICT guide;
+  int32_t count;
+};
+
+/// The last entry of table `which` whose cumulative mass is not above u's cell: entries without mass share
+/// their successor's (or the end's) and are never the last.
 template <class D>
-HWY_INLINE TableEntry<D> InvertTable(D d, const int32_t* HWY_RESTRICT table, Int<D> start,
-                                     int32_t count, Real<D> u) {
+HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> which, Real<D> u) {
   const IntTag<D> di;
-  const Int<D> total = hn::Set(di, kEnvironmentMass), end = hn::Set(di, count);
+  const Int<D> one = hn::Set(di, 1), last = hn::Set(di, tables.count - 1);
   const Real<D> clamped = hn::Min(hn::Max(u, hn::Zero(d)), Splat(d, kLargestBelowOne));
   const Int<D> cell = hn::ConvertTo(di, clamped * Splat(d, kEnvironmentMass));
-  const auto cumulative = [&](Int<D> i) HWY_ATTR {
-    const auto inside = hn::Lt(i, end);
-    return hn::IfThenElse(inside, GatherInt(d, table, start + hn::IfThenElseZero(inside, i)), total);
-  };
+  const Int<D> cdf = which * hn::Set(di, tables.count);
+  const Int<D> guide = which * hn::Set(di, GuideSize(tables.count)) +
+                       hn::ShiftRightSame(cell, 24 - GuideBits(tables.count));
 
-  int32_t step = 1;
-  while (step < count) step *= 2;
-  Int<D> index = hn::Zero(di);
-  for (step /= 2; step > 0; step /= 2) {
-    const Int<D> candidate = index + hn::Set(di, step);
-    index = hn::IfThenElse(hn::Gt(cumulative(candidate), cell), index, candidate);
+  Int<D> low = GatherInt(d, tables.guide, guide);
+  Int<D> high = GatherInt(d, tables.guide, guide + one);
+  for (auto open = hn::Lt(low, high); !hn::AllFalse(di, open); open = hn::Lt(low, high)) {
+    const Int<D> middle = hn::ShiftRight<1>(low + high + one);
+    const auto above = hn::Gt(GatherInt(d, tables.cdf, cdf + middle), cell);
+    low = hn::IfThenElse(hn::AndNot(above, open), middle, low);
+    high = hn::IfThenElse(hn::And(above, open), middle - one, high);
   }
-  const Int<D> low = cumulative(index);
-  const Int<D> mass = cumulative(index + hn::Set(di, 1)) - low;
+  const Int<D> begin = GatherInt(d, tables.cdf, cdf + low);
+  const Int<D> next = GatherInt(d, tables.cdf, cdf + hn::Min(low + one, last));
+  const Int<D> end = hn::IfThenElse(hn::Lt(low, last), next, hn::Set(di, kEnvironmentMass));
   // The middle of u's cell, so that an entry of a single cell is met at its centre.
-  const Real<D> offset = hn::ConvertTo(d, cell - low) + Splat(d, 0.5);
-  const Real<D> within = SafeDiv(d, offset, hn::ConvertTo(d, mass));
-  return {index, hn::Min(within, Splat(d, kLargestBelowOne))};
+  const Real<D> offset = hn::ConvertTo(d, cell - begin) + Splat(d, 0.5);
+  const Real<D> within = SafeDiv(d, offset, hn::ConvertTo(d, end - begin));
+  return {low, hn::Min(within, Splat(d, kLargestBelowOne))};
 }
 
 /// Inverts the triangle distribution on (-1, 1), monotonically.
@@ -221,9 +221,10 @@ HWY_INLINE Real<D> RowsFromPole(D d, const EnvironmentView& view, const Environm
 template <class D>
 HWY_INLINE EnvironmentPlace<D> SamplePlace(D d, const EnvironmentView& view, const Vec2<D>& u) {
   const IntTag<D> di;
-  const TableEntry<D> row = InvertTable(d, view.row_cdf, hn::Zero(di), view.height, u.y);
-  const TableEntry<D> column =
-      InvertTable(d, view.column_cdf, row.index * hn::Set(di, view.width), view.width, u.x);
+  const SelectionTables rows = {view.row_cdf, view.row_guide, view.height};
+  const SelectionTables columns = {view.column_cdf, view.column_guide, view.width};
+  const TableEntry<D> row = InvertTable(d, rows, hn::Zero(di), u.y);
+  const TableEntry<D> column = InvertTable(d, columns, row.index, u.x);
   EnvironmentPlace<D> place;
   place.i = WrapColumn(d, PlaceUnderTent(d, column, place.fs), view.width);
   place.j = PlaceUnderTent(d, row, place.ft);
@@ -257,9 +258,8 @@ HWY_INLINE EnvironmentSample<D> SampleEnvironment(D d, const EnvironmentView& vi
                                                   const Vec2<D>& u) {
   if (view.width == 0) return {Splat3(d, 0, 1, 0), Splat3(d, 0, 0, 0), hn::Zero(d)};
   const EnvironmentPlace<D> place = SamplePlace(d, view, u);
-  const EnvironmentTaps<D> taps = TapsAt(d, view, place);
-  return {DirectionOfPlace(d, view, place), InterpolateRadiance(d, view, taps),
-          InterpolatePdf(d, view, taps, place.sin_theta)};
+  const EnvironmentValue<D> value = ValueAt(d, view, place);
+  return {DirectionOfPlace(d, view, place), value.radiance, value.pdf};
 }
 
 }  // namespace lights

@@ -16,6 +16,7 @@
 #include <cstddef>
 
 #include "stages/kernels/light_math-inl.h"
+#include "stages/simd/quads-inl.h"
 #include "stages/tables/light_view.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -52,19 +53,34 @@ constexpr double kLeastSquaredDistance = 1e-30;
 constexpr double kLeastImportance = 1e-37;
 constexpr double kLeastShare = 1.0 / 1024;  // of a child among the two, if it may contribute at all
 
+/// One node per lane.
+template <class D>
+struct NodeLanes {
+  Vec3<D> center, axis;
+  Real<D> radius, signed_power;
+  Real<D> cos_o, cos_e;
+  Int<D> child_or_light, parent;
+};
+template <class D>
+HWY_INLINE NodeLanes<D> LoadNode(D d, const LightNode* nodes, Int<D> node) {
+  const IntTag<D> di;
+  const Quad<D> sphere = FieldQuad(d, nodes, node, offsetof(LightNode, center));
+  const Quad<D> emission = FieldQuad(d, nodes, node, offsetof(LightNode, axis));
+  const Quad<D> rest = FieldQuad(d, nodes, node, offsetof(LightNode, cos_theta_o));
+  return {{sphere.x, sphere.y, sphere.z}, {emission.x, emission.y, emission.z},
+          sphere.w, emission.w, rest.x, rest.y, hn::BitCast(di, rest.z), hn::BitCast(di, rest.w)};
+}
+
 /// Cosine bound of the emitters' normals: 0 where nothing of the cluster can shine towards the receiver.
 /// `cos_w` is between the axis and the direction from the cluster's centre to the receiver.
 template <class D>
-HWY_INLINE Real<D> EmissionBound(D d, const LightNode* nodes, Int<D> node, Real<D> cos_w,
+HWY_INLINE Real<D> EmissionBound(D d, const NodeLanes<D>& node, Real<D> cos_w,
                                  const Angle<D>& subtended) {
-  const Mask<D> two_sided = ToMask(
-      d, hn::Ne(FieldInt(d, nodes, node, offsetof(LightNode, two_sided)), hn::Zero(IntTag<D>())));
+  const Mask<D> two_sided = hn::Lt(node.signed_power, hn::Zero(d));
   const Angle<D> w = AngleFromCos(d, hn::IfThenElse(two_sided, hn::Abs(cos_w), cos_w));
-  const Angle<D> o = {FieldReal(d, nodes, node, offsetof(LightNode, cos_theta_o)),
-                      FieldReal(d, nodes, node, offsetof(LightNode, sin_theta_o))};
+  const Angle<D> o = AngleFromCos(d, node.cos_o);
   const Real<D> cos = SubtractClamped(d, SubtractClamped(d, w, o), subtended).cos;
-  const Real<D> cos_e = FieldReal(d, nodes, node, offsetof(LightNode, cos_theta_e));
-  return hn::IfThenElseZero(hn::Gt(cos, cos_e - Splat(d, kCullMargin)),
+  return hn::IfThenElseZero(hn::Gt(cos, node.cos_e - Splat(d, kCullMargin)),
                             hn::Max(cos, Splat(d, kLeastEmission)));
 }
 
@@ -76,33 +92,29 @@ HWY_INLINE Real<D> ReceptionBound(D d, const Receiver<D>& receiver, Real<D> cos_
   return hn::IfThenElse(receiver.all_sides, Splat(d, 1), hn::Max(cos, Splat(d, kLeastReception)));
 }
 
-/// What the cluster under `node` may contribute to the receiver, up to a factor common to all nodes.
+/// What the cluster may contribute to the receiver, up to a factor common to all nodes.
 template <class D>
-HWY_INLINE Real<D> Importance(D d, const LightNode* nodes, Int<D> node,
-                              const Receiver<D>& receiver) {
-  const Vec3<D> center = FieldVec3(d, nodes, node, offsetof(LightNode, center));
-  const Real<D> radius = FieldReal(d, nodes, node, offsetof(LightNode, radius));
-  const Vec3<D> axis = FieldVec3(d, nodes, node, offsetof(LightNode, axis));
-  const Real<D> power = FieldReal(d, nodes, node, offsetof(LightNode, power));
-
-  const Vec3<D> away = Sub<D>(receiver.position, center);
-  const Real<D> squared = Dot(away, away), squared_radius = radius * radius;
-  const Mask<D> outside = hn::Gt(squared, squared_radius);
-  const Real<D> inverse = SafeDiv(d, Splat(d, 1), hn::Sqrt(squared));
+HWY_INLINE Real<D> Importance(D d, const NodeLanes<D>& node, const Receiver<D>& receiver) {
+  const Real<D> one = Splat(d, 1);
+  const Vec3<D> away = Sub<D>(receiver.position, node.center);
+  const Real<D> squared = Dot(away, away), squared_radius = node.radius * node.radius;
+  const Real<D> floor = hn::Max(squared_radius, Splat(d, kLeastSquaredDistance));
+  const Mask<D> outside = hn::Gt(squared, floor);
+  const Real<D> inverse_square = one / hn::Max(squared, floor);
+  const Real<D> inverse = hn::Sqrt(inverse_square);
   // Inside the sphere the cluster may lie in any direction: an angle of pi takes every bound to 1.
-  const Real<D> sin_b = hn::IfThenElseZero(outside, radius * inverse);
+  const Real<D> sin_b = hn::IfThenElseZero(outside, node.radius * inverse);
   const Real<D> cos_b = hn::IfThenElse(
-      outside, SafeSqrt(d, hn::NegMulAdd(sin_b, sin_b, Splat(d, 1))), Splat(d, -1));
+      outside, SafeSqrt(d, hn::NegMulAdd(sin_b, sin_b, one)), Splat(d, -1));
   const Angle<D> subtended = {cos_b, sin_b};
 
-  const Real<D> emission =
-      EmissionBound(d, nodes, node, hn::IfThenElse(outside, Dot(axis, away) * inverse, Splat(d, 1)),
-                    subtended);
-  const Real<D> reception = ReceptionBound(
-      d, receiver, hn::IfThenElse(outside, hn::Neg(Dot(receiver.normal, away)) * inverse, Splat(d, 1)),
-      subtended);
-  const Real<D> floor = hn::Max(squared_radius, Splat(d, kLeastSquaredDistance));
-  const Real<D> importance = power * (emission * reception) / hn::Max(squared, floor);
+  const Real<D> cos_w = hn::IfThenElse(outside, Dot(node.axis, away) * inverse, one);
+  const Real<D> cos_i =
+      hn::IfThenElse(outside, hn::Neg(Dot(receiver.normal, away)) * inverse, one);
+  const Real<D> emission = EmissionBound(d, node, cos_w, subtended);
+  const Real<D> reception = ReceptionBound(d, receiver, cos_i, subtended);
+  const Real<D> importance =
+      hn::Abs(node.signed_power) * (emission * reception) * inverse_square;
   return hn::IfThenElseZero(hn::Gt(emission, hn::Zero(d)),
                             hn::Max(importance, Splat(d, kLeastImportance)));
 }
@@ -156,18 +168,18 @@ HWY_INLINE LightPick<D> PickLight(D d, const LightView& view, Mask<D> active,
   if (view.node_count == 0) return {none, hn::Zero(d), u};
 
   Refill<D> refill(d, position, u);
-  Int<D> node = zero;
+  Int<D> child = FieldInt(d, view.nodes, zero, offsetof(LightNode, child_or_light));
   while (!hn::AllFalse(d, active)) {
-    const Int<D> child = FieldInt(d, view.nodes, node, offsetof(LightNode, child_or_light));
     const Mask<D> leaf = hn::And(active, ToMask(d, hn::Lt(child, zero)));
     pick.light = hn::IfThenElse(ToIntMask(d, leaf), hn::Not(child), pick.light);
     active = hn::AndNot(leaf, active);
     if (hn::AllFalse(d, active)) break;
 
-    const Int<D> left = hn::IfThenElseZero(ToIntMask(d, active), child);
-    const Int<D> right = left + hn::Set(di, 1);
-    const Real<D> left_importance = Importance(d, view.nodes, left, receiver);
-    const Real<D> right_importance = Importance(d, view.nodes, right, receiver);
+    const Int<D> pair = hn::IfThenElseZero(ToIntMask(d, active), child);
+    const NodeLanes<D> left = LoadNode(d, view.nodes, pair);
+    const NodeLanes<D> right = LoadNode(d, view.nodes, pair + hn::Set(di, 1));
+    const Real<D> left_importance = Importance(d, left, receiver);
+    const Real<D> right_importance = Importance(d, right, receiver);
     const Real<D> sum = left_importance + right_importance;
     const Mask<D> dark = hn::And(active, hn::Not(hn::Gt(sum, hn::Zero(d))));
     pick.probability = hn::IfThenZeroElse(dark, pick.probability);
@@ -181,8 +193,7 @@ HWY_INLINE LightPick<D> PickLight(D d, const LightView& view, Mask<D> active,
     const Real<D> remapped = hn::Min(SafeDiv(d, refilled, q), Splat(d, kLargestBelowOne));
     pick.u_remapped = hn::IfThenElse(active, remapped, pick.u_remapped);
     pick.probability = hn::IfThenElse(active, pick.probability * q, pick.probability);
-    node = hn::IfThenElse(ToIntMask(d, hn::And(active, go_left)), left,
-                          hn::IfThenElse(ToIntMask(d, active), right, node));
+    child = hn::IfThenElse(ToIntMask(d, go_left), left.child_or_light, right.child_or_light);
   }
   return pick;
 }
@@ -203,22 +214,24 @@ HWY_INLINE Real<D> PickProbability(D d, const LightView& view, Mask<D> active,
   active = ToMask(d, hn::Gt(node, hn::Set(di, kNone)));
   Real<D> probability = hn::IfThenElseZero(active, Splat(d, 1));
 
-  for (;;) {
+  while (!hn::AllFalse(d, active)) {
     const Int<D> here = hn::Max(node, zero);
-    const Int<D> parent = FieldInt(d, view.nodes, here, offsetof(LightNode, parent));
-    active = hn::And(active, ToMask(d, hn::Gt(parent, hn::Set(di, kNone))));
-    if (hn::AllFalse(d, active)) return probability;
-    const Int<D> left = hn::IfThenElseZero(ToIntMask(d, active), hn::AndNot(one, here));
-    const Real<D> left_importance = Importance(d, view.nodes, left, receiver);
-    const Real<D> right_importance = Importance(d, view.nodes, left + one, receiver);
+    const Int<D> pair = hn::AndNot(one, here);
+    const NodeLanes<D> left = LoadNode(d, view.nodes, pair);
+    const NodeLanes<D> right = LoadNode(d, view.nodes, pair + one);
+    const Real<D> left_importance = Importance(d, left, receiver);
+    const Real<D> right_importance = Importance(d, right, receiver);
+    const auto is_left = hn::Eq(here, pair);
+    active = hn::And(active, ToMask(d, hn::Gt(left.parent, hn::Set(di, kNone))));
     const Mask<D> dark = hn::Not(hn::Gt(left_importance + right_importance, hn::Zero(d)));
     const Real<D> p = LeftProbability(d, left_importance, right_importance);
-    const Mask<D> is_left = ToMask(d, hn::Eq(here, left));
-    const Real<D> q = hn::IfThenZeroElse(dark, hn::IfThenElse(is_left, p, Splat(d, 1) - p));
+    const Real<D> q =
+        hn::IfThenZeroElse(dark, hn::IfThenElse(ToMask(d, is_left), p, Splat(d, 1) - p));
     probability = hn::IfThenElse(active, probability * q, probability);
-    node = hn::IfThenElse(ToIntMask(d, active), parent, node);
+    node = hn::IfThenElse(ToIntMask(d, active), left.parent, node);
     active = hn::And(active, hn::Gt(probability, hn::Zero(d)));
   }
+  return probability;
 }
 
 }  // namespace lights

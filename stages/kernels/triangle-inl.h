@@ -12,6 +12,7 @@
 #include <cstddef>
 
 #include "stages/simd/lanes-inl.h"
+#include "stages/simd/quads-inl.h"
 #include "stages/tables/geometry_view.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -41,16 +42,23 @@ HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& vie
           GatherInt(d, view.indices, first + hn::Set(di, 2))};
 }
 
-/// A point of object space through the placement's object_to_world.
+/// The rows of a 3x4 matrix.
 template <class D>
-HWY_INLINE Vec3<D> PlacementToWorld(D d, const GeometryView& view, Int<D> placement,
-                                    const Vec3<D>& p) {
+struct Affine {
+  Quad<D> rows[3];
+};
+template <class D>
+HWY_INLINE Affine<D> ObjectToWorld(D d, const GeometryView& view, Int<D> placement) {
   const auto row = [&](size_t i) HWY_ATTR {
-    const size_t at = offsetof(Placement, object_to_world) + 16 * i;
-    const Vec3<D> axes = FieldVec3(d, view.placements, placement, at);
-    return Dot(axes, p) + FieldReal(d, view.placements, placement, at + 12);
+    return FieldQuad(d, view.placements, placement, offsetof(Placement, object_to_world) + 16 * i);
   };
-  return {row(0), row(1), row(2)};
+  return {{row(0), row(1), row(2)}};
+}
+template <class D>
+HWY_INLINE Vec3<D> TransformPoint(const Affine<D>& m, const Vec3<D>& p) {
+  const auto row = [&](const Quad<D>& r)
+                       HWY_ATTR { return Dot(Vec3<D>{r.x, r.y, r.z}, p) + r.w; };
+  return {row(m.rows[0]), row(m.rows[1]), row(m.rows[2])};
 }
 
 /// The triangle's vertices in world space. Every lane needs a valid placement and primitive.
@@ -72,9 +80,10 @@ HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view, Int<D> pl
   const Mask<D> instanced = has(kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
     // Flat lanes keep their vertices: going through an identity would cost them a rounding of -0.
-    p0 = Select<D>(instanced, PlacementToWorld(d, view, placement, p0), p0);
-    p1 = Select<D>(instanced, PlacementToWorld(d, view, placement, p1), p1);
-    p2 = Select<D>(instanced, PlacementToWorld(d, view, placement, p2), p2);
+    const Affine<D> to_world = ObjectToWorld(d, view, placement);
+    p0 = Select<D>(instanced, TransformPoint<D>(to_world, p0), p0);
+    p1 = Select<D>(instanced, TransformPoint<D>(to_world, p1), p1);
+    p2 = Select<D>(instanced, TransformPoint<D>(to_world, p2), p2);
   }
   return {p0, p1, p2, has(kPlacementMirrored)};
 }

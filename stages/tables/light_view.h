@@ -13,11 +13,15 @@ struct EnvironmentView {
   const float* texels = nullptr;
   const int32_t* row_cdf = nullptr;
   const int32_t* column_cdf = nullptr;
+  const int32_t* row_guide = nullptr;
+  const int32_t* column_guide = nullptr;
 };
 
 inline EnvironmentView ViewOf(const Environment& environment) {
-  return {environment.width, environment.height, environment.texels.data(),
-          environment.row_cdf.data(), environment.column_cdf.data()};
+  return {environment.width,          environment.height,
+          environment.texels.data(),  environment.row_cdf.data(),
+          environment.column_cdf.data(), environment.row_guide.data(),
+          environment.column_guide.data()};
 }
 
 /// Borrows from a `SceneTables` that must outlive it and stay unchanged.

@@ -1,6 +1,7 @@
 // Lights as the kernels read them: light records, the light tree over them, and the environment.
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <vector>
 
@@ -35,21 +36,29 @@ static_assert(sizeof(Light) == 64);
 struct alignas(64) LightNode {
   float center[3] = {0, 0, 0};  // sphere around everything that emits
   float radius = 0;
-  float axis[3] = {0, 0, 1};  // cone of emission normals (Conty Estevez & Kulla 2018)
-  float power = 0;            // candela of luminance, summed, as a share of the whole tree's
-  float cos_theta_o = 1;      // bound on the angle between an emitter's normal and the axis
-  float sin_theta_o = 0;
-  float cos_theta_e = 0;      // bound on the emission angle about a normal
-  int32_t two_sided = 0;      // 1: the cone's opposite counts as well
+  float axis[3] = {0, 0, 1};    // cone of emission normals (Conty Estevez & Kulla 2018)
+  float signed_power = 0;       // candela of luminance, summed, as a share of the whole tree's;
+                                // negative: the cone's opposite counts as well (two-sided emitters)
+  float cos_theta_o = 1;        // bound on the angle between an emitter's normal and the axis
+  float cos_theta_e = 0;        // bound on the emission angle about a normal
   int32_t child_or_light = -1;  // inner: index of the left child, the right one follows; leaf: ~light
   int32_t parent = -1;          // -1 at the root
-  int32_t pad[2] = {};
+  int32_t pad[4] = {};
 };
 static_assert(sizeof(LightNode) == 64);
 
 /// Selection masses of an environment table are integers whose sum is this: the grid of a 24-bit float in
 /// [0, 1), so that a table is inverted without any rounding.
 constexpr int32_t kEnvironmentMass = 1 << 24;
+
+/// Inverting a table starts from its guide (Chen & Asau 1974, "On Generating Random Variates from an
+/// Empirical Distribution"): numbers are divided into 2^bits equal cells, and entry k of the guide is
+/// where a search for the first number of cell k ends; one more entry is for the last number of all.
+constexpr int32_t GuideBits(int32_t count) {
+  const int32_t width = std::bit_width(static_cast<uint32_t>(count));
+  return width > 3 ? width - 3 : 0;
+}
+constexpr int32_t GuideSize(int32_t count) { return (1 << GuideBits(count)) + 1; }
 
 /// Lat-long environment map. Radiance is bilinear between texel centres, wrapping in u, clamped in v;
 /// direction (x, y, z) is at u = 1/2 + atan2(x, -z) / 2 pi, v = acos(y) / pi (glTF's -Z is the middle).
@@ -61,6 +70,8 @@ struct Environment {
   std::vector<float> texels;
   std::vector<int32_t> row_cdf;     // height entries: exclusive cumulative mass of rows
   std::vector<int32_t> column_cdf;  // width * height: exclusive cumulative mass within each row
+  std::vector<int32_t> row_guide;     // GuideSize(height) entries
+  std::vector<int32_t> column_guide;  // height * GuideSize(width)
 };
 
 struct LightTables {

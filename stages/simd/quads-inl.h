@@ -1,0 +1,71 @@
+// Fetches four neighbouring words of one record per lane, by loading records and transposing registers.
+//
+// A gather of N lanes reads N words by N addresses; four of them read the same cache lines four times. From
+// four lanes up, loading each record's 16 bytes and transposing blocks of 4x4 costs about a third (Zen 4).
+//
+// Per-target header: see stages/simd/lanes-inl.h.
+
+#if defined(CARPOOL_STAGES_SIMD_QUADS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef CARPOOL_STAGES_SIMD_QUADS_INL_H_
+#undef CARPOOL_STAGES_SIMD_QUADS_INL_H_
+#else
+#define CARPOOL_STAGES_SIMD_QUADS_INL_H_
+#endif
+
+#include "stages/simd/lanes-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace carpool::stages::HWY_NAMESPACE {
+
+/// Words 0..3 of a record, one record per lane.
+template <class D>
+struct Quad {
+  Real<D> x, y, z, w;
+};
+
+/// One 16-byte block per record `base[index[4 k]]`, k = 0, 1, ...: as many as the vector has blocks.
+template <class D>
+HWY_INLINE Real<D> LoadBlocks(D d, const float* HWY_RESTRICT base, const int32_t* index) {
+  if constexpr (hn::MaxLanes(D()) == 4) {
+    return hn::LoadU(d, base + index[0]);
+  } else {
+    const hn::Half<D> half;
+    constexpr size_t kHalf = hn::MaxLanes(hn::Half<D>());
+    return hn::Combine(d, LoadBlocks(half, base, index + kHalf), LoadBlocks(half, base, index));
+  }
+}
+
+/// base[index], base[index + 1], ... base[index + 3]; `index` counts floats. All four must be readable in
+/// every lane.
+template <class D>
+HWY_INLINE Quad<D> GatherQuad(D d, const float* HWY_RESTRICT base, Int<D> index) {
+  const IntTag<D> di;
+  if constexpr (hn::MaxLanes(D()) < 4) {
+    const auto word = [&](int32_t k) HWY_ATTR { return GatherReal(d, base, index + hn::Set(di, k)); };
+    return {word(0), word(1), word(2), word(3)};
+  } else {
+    HWY_ALIGN int32_t at[hn::MaxLanes(D())];
+    hn::Store(index, di, at);
+    // Block k of `a` is the record of lane 4 k, of `b` that of lane 4 k + 1, and so on.
+    const Real<D> a = LoadBlocks(d, base, at), b = LoadBlocks(d, base, at + 1),
+                  c = LoadBlocks(d, base, at + 2), e = LoadBlocks(d, base, at + 3);
+    const Real<D> ac_low = hn::InterleaveLower(d, a, c), be_low = hn::InterleaveLower(d, b, e);
+    const Real<D> ac_high = hn::InterleaveUpper(d, a, c), be_high = hn::InterleaveUpper(d, b, e);
+    return {hn::InterleaveLower(d, ac_low, be_low), hn::InterleaveUpper(d, ac_low, be_low),
+            hn::InterleaveLower(d, ac_high, be_high), hn::InterleaveUpper(d, ac_high, be_high)};
+  }
+}
+
+/// The four floats from byte `offset` of record `index` in an array of `Record`s.
+template <class Record, class D>
+HWY_INLINE Quad<D> FieldQuad(D d, const Record* HWY_RESTRICT base, Int<D> index, size_t offset) {
+  static_assert(sizeof(Record) % 4 == 0);
+  const IntTag<D> di;
+  return GatherQuad(d, reinterpret_cast<const float*>(base) + offset / 4,
+                    index * hn::Set(di, static_cast<int32_t>(sizeof(Record) / 4)));
+}
+
+}  // namespace carpool::stages::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per-target include guard
