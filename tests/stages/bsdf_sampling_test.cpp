@@ -195,15 +195,17 @@ TEST(BsdfSampling, VisibleNormalsFollowTheirDensityOverTheWholeSphere) {
 struct LightEstimates {
   Mean light, bsdf;
 };
+constexpr size_t kLightCount = 1 << 17;
+
 LightEstimates EstimateLight(const Surface& surface, double mu, double radius, uint32_t seed) {
   const Direction wo = OutgoingAt(mu);
   const Grid frame = MakeGrid({-wo.x, -wo.y, wo.z}, {0, radius, kPi}, 1);
   const double solid_angle = 4 * kPi * std::pow(std::sin(radius / 2), 2);
   LightEstimates estimates;
 
-  const Columns u = IndependentUniforms(3, kCount, seed);
-  Columns directions(6, std::vector<double>(kCount));
-  for (size_t i = 0; i < kCount; ++i) {
+  const Columns u = IndependentUniforms(3, kLightCount, seed);
+  Columns directions(6, std::vector<double>(kLightCount));
+  for (size_t i = 0; i < kLightCount; ++i) {
     const double half = std::sin(radius / 2) * std::sqrt(u[0][i]);  // sine of half the polar angle
     const double cosine = 1 - 2 * half * half, sine = 2 * half * std::sqrt(1 - half * half), turn = 2 * kPi * u[1][i];
     const double a = sine * std::cos(turn), b = sine * std::sin(turn);
@@ -213,10 +215,11 @@ LightEstimates EstimateLight(const Surface& surface, double mu, double radius, u
     directions[0][i] = wo.x, directions[1][i] = wo.y, directions[2][i] = wo.z;
     for (int c = 0; c < 3; ++c) directions[3 + c][i] = static_cast<float>(wi[c]);
   }
-  for (const double f_cos : BestBsdfKernels().evaluate(surface, directions)[kValueG]) estimates.light.Add(f_cos * solid_angle);
+  const Columns values = BestBsdfKernels().evaluate(surface, directions);
+  for (const double f_cos : values[kValueG]) estimates.light.Add(f_cos * solid_angle);
 
-  const Columns out = BestBsdfKernels().sample(surface, wo, IndependentUniforms(3, kCount, seed + 1));
-  for (size_t i = 0; i < kCount; ++i) {
+  const Columns out = BestBsdfKernels().sample(surface, wo, IndependentUniforms(3, kLightCount, seed + 1));
+  for (size_t i = 0; i < kLightCount; ++i) {
     const bool hit = CellOf(frame, out[kSampleX][i], out[kSampleY][i], out[kSampleZ][i]) == 0;
     estimates.bsdf.Add(hit ? out[kWeightG][i] : 0);
   }

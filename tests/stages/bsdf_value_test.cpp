@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "stages/simd/denormals.h"
 #include "tests/stages/bsdf_directions.h"
 
 namespace carpool::tests {
@@ -135,13 +136,15 @@ TEST(Bsdf, BlackIsBlackWithoutNan) {
       for (int c = 0; c < 3; ++c) ASSERT_EQ(out[kWeightR + c][i], 0);
     }
     // A black metal still mirrors at grazing angles (F90 is 1), and stays finite.
-    for (const double weight : kernels.sample(black_metal, OutgoingAt(0.05), u)[kWeightR]) {
+    const Columns grazing = kernels.sample(black_metal, OutgoingAt(0.05), u);
+    for (const double weight : grazing[kWeightR]) {
       ASSERT_TRUE(std::isfinite(weight) && weight >= 0 && weight < 16);
     }
   }
 }
 
-TEST(Bsdf, ExtremesAreFinite) {
+/// Both denormal settings: kernels run with denormals flushed.
+void ExpectFiniteExtremes() {
   Columns wo(3), wi(3);
   const double cosines[] = {1e-38, 1e-20, 1e-10, 1e-7, 1e-4, 0.01, 0.5, 1};
   for (int i = 0; i < 64; ++i) {
@@ -177,6 +180,12 @@ TEST(Bsdf, ExtremesAreFinite) {
       }
     }
   }
+}
+
+TEST(Bsdf, ExtremesAreFinite) {
+  ExpectFiniteExtremes();
+  const stages::FlushDenormals flush;
+  ExpectFiniteExtremes();
 }
 
 TEST(Bsdf, BelowTheSurfaceIsZero) {
