@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <vector>
 
 #include "render/image/srgb_encode.h"
@@ -91,7 +90,7 @@ class Codec {
   uint32_t Encode(float linear, bool srgb) const {
     if (srgb && !wide_) return encoder_(linear);
     const double encoded = srgb ? stages::LinearToSrgb(linear) : linear;
-    return static_cast<uint32_t>(std::lround(encoded * (wide_ ? 65535.0 : 255.0)));
+    return static_cast<uint32_t>(encoded * (wide_ ? 65535.0 : 255.0) + 0.5);
   }
 
   bool wide_, srgb_;
