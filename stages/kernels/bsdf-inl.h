@@ -73,40 +73,43 @@ HWY_INLINE Real<D> SumComponents(const Vec3<D>& c) {
   return c.x + c.y + c.z;
 }
 
-/// The part of PrepareBsdf that needs both interfaces and the albedos at wo.
+/// GGX is linear in F0 and F90, so one lobe with mixed values is the mixture of two lobes.
 template <class D>
-HWY_INLINE void PrepareLobes(D d, const SchlickTerm<D>& dielectric, const Vec3<D>& base, Real<D> metallic,
-                             const AlbedoAt<D>& at_wo, Bsdf<D>& bsdf) {
+HWY_INLINE void PrepareSpecular(D d, const SchlickTerm<D>& dielectric, const Vec3<D>& base, Real<D> metallic,
+                                const AlbedoAt<D>& at_wo, SpecularLobe<D>& lobe) {
   const Real<D> one = Splat(d, 1);
-  const Real<D> rest = one - metallic;
-  const AlbedoAt<D>& average = bsdf.row.average;
-  const SchlickTerm<D> metal{base, one};
-
-  // GGX is linear in F0 and F90, so one lobe with mixed values is the mixture of two lobes.
-  bsdf.f0 = MulAdd<D>(Sub<D>(base, dielectric.f0), metallic, dielectric.f0);
-  bsdf.f90 = hn::MulAdd(one - dielectric.f90, metallic, dielectric.f90);
+  lobe.f0 = MulAdd<D>(Sub<D>(base, dielectric.f0), metallic, dielectric.f0);
+  lobe.f90 = hn::MulAdd(one - dielectric.f90, metallic, dielectric.f90);
   const Real<D> single = hn::Max(one - at_wo.m - at_wo.b, hn::Zero(d));
-  bsdf.SpecularLobe<D>::weight = hn::MulAdd(SumComponents<D>(bsdf.f0), single, Splat(d, 3) * bsdf.f90 * at_wo.b);
+  lobe.weight = hn::MulAdd(SumComponents<D>(lobe.f0), single, Splat(d, 3) * lobe.f90 * at_wo.b);
+}
 
-  const Vec3<D> dielectric_multi = MultiScatterColor<D>(d, dielectric, average.m);
-  Vec3<D> multi = Scale<D>(dielectric_multi, rest);
+template <class D>
+HWY_INLINE void PrepareMultiScatter(D d, const Vec3<D>& dielectric_share, const Vec3<D>& base, Real<D> metallic,
+                                    const AlbedoAt<D>& at_wo, const AlbedoRow<D>& row, MultiScatterLobe<D>& lobe) {
+  Vec3<D> share = Scale<D>(dielectric_share, Splat(d, 1) - metallic);
   if (!hn::AllFalse(d, hn::Gt(metallic, hn::Zero(d)))) {
-    multi = MulAdd<D>(MultiScatterColor<D>(d, metal, average.m), metallic, multi);
+    const SchlickTerm<D> metal{base, Splat(d, 1)};
+    share = MulAdd<D>(MultiScatterColor<D>(d, metal, row.average.m), metallic, share);
   }
-  bsdf.multi = Scale<D>(multi, SafeDiv(d, at_wo.m, average.m));
-  bsdf.MultiScatterLobe<D>::weight = SumComponents<D>(bsdf.multi) * average.m;
-  bsdf.SetSpread(d, bsdf.row.log2_spread);
+  lobe.multi = Scale<D>(share, SafeDiv(d, at_wo.m, row.average.m));
+  lobe.weight = SumComponents<D>(lobe.multi) * row.average.m;
+  lobe.SetSpread(d, row.log2_spread);
+}
 
-  // 1 - E, with the brightest channel's E for all channels, as KHR_materials_specular has it.
+/// 1 - E, with the brightest channel's E for all channels, as KHR_materials_specular has it.
+template <class D>
+HWY_INLINE void PrepareDiffuse(D d, const SchlickTerm<D>& dielectric, const Vec3<D>& dielectric_share,
+                               const Vec3<D>& base, Real<D> metallic, const AlbedoAt<D>& at_wo,
+                               const AlbedoRow<D>& row, DiffuseLobe<D>& lobe) {
+  const Real<D> one = Splat(d, 1);
   const Real<D> f0 = MaxComponent<D>(dielectric.f0);
-  const Real<D> share = MaxComponent<D>(dielectric_multi);
-  bsdf.through = one - f0;
-  bsdf.through_m = share - f0;
-  bsdf.through_b = dielectric.f90 - f0;
-  const Real<D> average_passed = bsdf.Passed(d, average);
-  const Real<D> scale = SafeDiv(d, bsdf.Passed(d, at_wo), average_passed) * rest;
-  bsdf.diffuse = Scale<D>(base, scale);
-  bsdf.DiffuseLobe<D>::weight = SumComponents<D>(bsdf.diffuse) * average_passed;
+  lobe.through = one - f0;
+  lobe.through_m = MaxComponent<D>(dielectric_share) - f0;
+  lobe.through_b = dielectric.f90 - f0;
+  const Real<D> average = lobe.Passed(d, row.average);
+  lobe.diffuse = Scale<D>(base, SafeDiv(d, lobe.Passed(d, at_wo), average) * (one - metallic));
+  lobe.weight = SumComponents<D>(lobe.diffuse) * average;
 }
 
 template <class D>
@@ -114,10 +117,16 @@ HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceP
   Bsdf<D> bsdf;
   bsdf.tables = tables;
   bsdf.row = FindAlbedoRow<D>(d, tables, params.roughness);
-  bsdf.SetOutgoing(d, bsdf.row.alpha, wo);
+  const Vec3<D> base = Clamp01<D>(d, params.base_color);
   const Real<D> metallic = hn::Min(hn::Max(params.metallic, hn::Zero(d)), Splat(d, 1));
   const AlbedoAt<D> at_wo = LookUpAlbedo<D>(d, tables, bsdf.row, hn::Max(wo.z, hn::Zero(d)));
-  PrepareLobes<D>(d, DielectricInterface<D>(d, params), Clamp01<D>(d, params.base_color), metallic, at_wo, bsdf);
+  const SchlickTerm<D> dielectric = DielectricInterface<D>(d, params);
+  const Vec3<D> share = MultiScatterColor<D>(d, dielectric, bsdf.row.average.m);
+
+  bsdf.SpecularLobe<D>::SetOutgoing(d, bsdf.row.alpha, wo);
+  PrepareSpecular<D>(d, dielectric, base, metallic, at_wo, bsdf);
+  PrepareMultiScatter<D>(d, share, base, metallic, at_wo, bsdf.row, bsdf);
+  PrepareDiffuse<D>(d, dielectric, share, base, metallic, at_wo, bsdf.row, bsdf);
   bsdf.SumWeights(d);
   return bsdf;
 }
