@@ -124,7 +124,7 @@ GltfWriter CornellBox() {
   const int red = scene.AddMaterial(Matte("red", {0.61, 0.057, 0.048}));
   const int green = scene.AddMaterial(Matte("green", {0.12, 0.43, 0.11}));
   const int lamp =
-      scene.AddMaterial(Emitting(Matte("lamp", {0.78, 0.78, 0.78}), {1, 0.74, 0.42}, 17));
+      scene.AddMaterial(Emitting(Matte("lamp", {0.78, 0.78, 0.78}), {1, 0.81, 0.55}, 40));
   AddCornellWalls(scene, white, red, green);
   const double short_block[4][2] = {{130, 65}, {82, 225}, {240, 272}, {290, 114}};
   const double tall_block[4][2] = {{423, 247}, {265, 296}, {314, 456}, {472, 406}};
@@ -174,13 +174,21 @@ GltfWriter Materials() {
                      {"scale", {0.45, 0.45, 0.45}}});
     }
   }
-  const int ground = scene.AddMaterial(Reflecting("ground", {0.32, 0.3, 0.29}, 0, 0.35));
-  AddObject(scene, "backdrop", Backdrop(14, 9, -6, 3, 9), ground);
-  const int key = scene.AddMaterial(Emitting(Matte("key lamp", {0, 0, 0}), {1, 0.86, 0.7}, 24));
-  const int fill = scene.AddMaterial(Emitting(Matte("fill lamp", {0, 0, 0}), {0.62, 0.78, 1}, 6));
-  AddObject(scene, "key lamp", Lamp(-3.5f, 2.5f, 5.5f, 1.2f, 1.2f), key);
-  AddObject(scene, "fill lamp", Lamp(4, 0.5f, 6, 1.2f, 2), fill);
-  scene.AddCamera("camera", {0, 3.9, 7.2}, {0, 0.25, -0.55}, 0.52);
+  const int ground = scene.AddMaterial(Reflecting("ground", {0.3, 0.285, 0.27}, 0, 0.4));
+  AddObject(scene, "backdrop", Backdrop(14, 12, -6, 3, 11), ground);
+  // Black panels that only glow: large and dim ones, so that mirrors have something to reflect, and
+  // a small bright one for shadows and highlights.
+  const Json panel = Matte("panel", {0, 0, 0});
+  const int key = scene.AddMaterial(Emitting(panel, {1, 0.85, 0.68}, 20));
+  const int soft = scene.AddMaterial(Emitting(panel, {0.8, 0.9, 1}, 1.2));
+  const int warm = scene.AddMaterial(Emitting(panel, {1, 0.55, 0.3}, 1.8));
+  AddObject(scene, "key lamp", Lamp(-3, 2.5f, 5, 1, 1), key);
+  AddObject(scene, "soft box", Lamp(0, -1, 8.5f, 7, 5), soft);
+  AddObject(scene, "right panel", Square({9, 0.2f, -6}, {9, 0.2f, 6}, {9, 6, 6}, {9, 6, -6}), soft);
+  AddObject(scene, "left panel", Square({-9, 0.2f, 5}, {-9, 0.2f, -6}, {-9, 5, -6}, {-9, 5, 5}),
+            warm);
+  AddObject(scene, "front panel", Square({-7, 1, 11}, {-7, 7, 11}, {7, 7, 11}, {7, 1, 11}), soft);
+  scene.AddCamera("camera", {0, 4.4, 8}, {0, 0.25, -0.5}, 0.53);
   return scene;
 }
 

@@ -6,7 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/gltf/accessors.h"
+#include "render/gltf/affine.h"
+#include "render/gltf/materials.h"
 #include "render/gltf/normals.h"
 #include "render/gltf/tangents.h"
 #include "tests/render/gltf/scene_builder.h"
@@ -201,6 +202,55 @@ TEST(Models, TangentsAreThoseOfMikkTSpace) {
     if (path.empty()) GTEST_SKIP() << "the development set of models is not on this machine";
     EXPECT_EQ(AgreementWithGivenTangents(path), 1.0) << file;
   }
+}
+
+class OwnScene : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(OwnScene, LoadsWithoutAWarning) {
+  std::vector<std::string> warnings;
+  const ImportedScene scene = LoadGltf(fs::path(CARPOOL_SCENES) / GetParam(), Collect(warnings));
+  EXPECT_THAT(warnings, ::testing::IsEmpty());
+  EXPECT_EQ(scene.cameras.size(), 1u);
+  ExpectSound(scene);
+}
+
+INSTANTIATE_TEST_SUITE_P(Small, OwnScene,
+                         ::testing::Values("cornell_box.gltf", "furnace.gltf", "materials.gltf"));
+
+/// Six times the volume that an instance's triangles enclose, seen from `eye`: negative where they
+/// face it.
+double SignedVolume(const ImportedScene& scene, const stages::MeshInstance& instance,
+                    const gltf::Vec3& eye) {
+  const stages::GeometryTables& tables = scene.geometry;
+  const stages::Shape& shape = tables.shapes[tables.meshes[instance.mesh].first_shape];
+  double volume = 0;
+  for (int t = 0; t < shape.triangle_count; ++t) {
+    gltf::Vec3 corners[3];
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t vertex = tables.indices[shape.first_index + 3 * t + c];
+      const float* p = &tables.floats[shape.positions + 3 * vertex];
+      const gltf::Vec3 world = gltf::TransformPoint(instance.object_to_world, {p[0], p[1], p[2]});
+      corners[c] = gltf::Subtract(world, eye);
+    }
+    volume += gltf::Dot(corners[0], gltf::Cross(corners[1], corners[2]));
+  }
+  return volume;
+}
+
+TEST(OwnScenes, SurfacesFaceTheRightWay) {
+  const ImportedScene box = LoadGltf(fs::path(CARPOOL_SCENES) / "cornell_box.gltf");
+  for (const stages::MeshInstance& instance : box.geometry.instances) {
+    const std::string& name = box.node_names[instance.object - 1];
+    const bool block = name.find("block") != std::string::npos;
+    // Walls and lamp face the middle of the room. Blocks have no bottom; from the floor that adds
+    // nothing.
+    const double volume = SignedVolume(box, instance, {0, block ? 0.0 : 1.0, 0});
+    EXPECT_EQ(volume < 0, !block) << name;
+  }
+  const ImportedScene furnace = LoadGltf(fs::path(CARPOOL_SCENES) / "furnace.gltf");
+  ASSERT_EQ(furnace.geometry.instances.size(), 2u);
+  EXPECT_NEAR(SignedVolume(furnace, furnace.geometry.instances[0], {0, 0, 0}), -6 * 64, 1e-4);
+  EXPECT_GT(SignedVolume(furnace, furnace.geometry.instances[1], {0, 0, 0}), 6 * 4.0);
 }
 
 }  // namespace
