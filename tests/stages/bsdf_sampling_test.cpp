@@ -50,34 +50,30 @@ size_t CellOf(const Grid& grid, double x, double y, double z) {
   return ring * grid.sectors + std::min(sector, grid.sectors - 1);
 }
 
-/// Mass of the pdf in each cell, by midpoints: `fine` x `fine` of them.
-std::vector<double> Masses(const Grid& grid, const Pdf& pdf, int fine) {
-  Columns wi(3);
-  std::vector<double> areas;
-  areas.reserve((grid.edges.size() - 1) * grid.sectors * fine * fine + 64);
-  for (auto& column : wi) column.reserve(areas.capacity());
-  for (size_t ring = 0; ring + 1 < grid.edges.size(); ++ring) {
-    for (int sector = 0; sector < grid.sectors; ++sector) {
-      for (int i = 0; i < fine * fine; ++i) {
-        const double step = (grid.edges[ring + 1] - grid.edges[ring]) / fine;
-        const double angle = grid.edges[ring] + (i / fine + 0.5) * step;
-        const double turn = ((sector + (i % fine + 0.5) / fine) / grid.sectors - 0.5) * 2 * kPi;
-        const double s = std::sin(angle), u = s * std::cos(turn), v = s * std::sin(turn), w = std::cos(angle);
-        wi[0].push_back(u * grid.tangent.x + v * grid.bitangent.x + w * grid.axis.x);
-        wi[1].push_back(u * grid.tangent.y + v * grid.bitangent.y + w * grid.axis.y);
-        wi[2].push_back(u * grid.tangent.z + v * grid.bitangent.z + w * grid.axis.z);
-        areas.push_back(s * step * 2 * kPi / (grid.sectors * fine));
-      }
-    }
-  }
-  const size_t size = areas.size();
-  while (areas.size() % 64 != 0) {
-    areas.push_back(0);
-    for (auto& column : wi) column.push_back(column.back());
+/// Mass of the pdf in each cell of one ring, by `fine` x `fine` midpoints a cell.
+void AddRing(const Grid& grid, size_t ring, const Pdf& pdf, int fine, std::vector<double>& masses) {
+  const int points = grid.sectors * fine * fine;
+  const int padded = (points + 63) / 64 * 64;
+  Columns wi(3, std::vector<double>(padded, 1));
+  std::vector<double> areas(points);
+  const double step = (grid.edges[ring + 1] - grid.edges[ring]) / fine;
+  for (int i = 0; i < points; ++i) {
+    const int sector = i / (fine * fine), within = i % (fine * fine);
+    const double angle = grid.edges[ring] + (within / fine + 0.5) * step;
+    const double turn = ((sector + (within % fine + 0.5) / fine) / grid.sectors - 0.5) * 2 * kPi;
+    const double s = std::sin(angle), u = s * std::cos(turn), v = s * std::sin(turn), w = std::cos(angle);
+    wi[0][i] = u * grid.tangent.x + v * grid.bitangent.x + w * grid.axis.x;
+    wi[1][i] = u * grid.tangent.y + v * grid.bitangent.y + w * grid.axis.y;
+    wi[2][i] = u * grid.tangent.z + v * grid.bitangent.z + w * grid.axis.z;
+    areas[i] = s * step * 2 * kPi / (grid.sectors * fine);
   }
   const std::vector<double> density = pdf(wi);
-  std::vector<double> masses(size / (fine * fine), 0);
-  for (size_t i = 0; i < size; ++i) masses[i / (fine * fine)] += density[i] * areas[i];
+  for (int i = 0; i < points; ++i) masses[ring * grid.sectors + i / (fine * fine)] += density[i] * areas[i];
+}
+
+std::vector<double> Masses(const Grid& grid, const Pdf& pdf, int fine) {
+  std::vector<double> masses((grid.edges.size() - 1) * grid.sectors, 0);
+  for (size_t ring = 0; ring + 1 < grid.edges.size(); ++ring) AddRing(grid, ring, pdf, fine, masses);
   return masses;
 }
 
