@@ -23,8 +23,8 @@ struct Block {
 struct ReadyBlock {
   Block block;
   FlushCause cause = FlushCause::full;
-  bool partial = false;
-  std::uint32_t lane = 0;
+  bool partial = false;    // counted, because the memory formula counts on there being few
+  std::uint32_t lane = 0;  // in the ReadyQueue
   ReadyBlock* newer = nullptr;
   ReadyBlock* older = nullptr;
 };

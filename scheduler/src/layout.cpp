@@ -225,7 +225,8 @@ void Layout::limit_classes() {
 }
 
 std::size_t Layout::table_bytes() const {
-  const std::size_t per_worker = OpenTable::bytes_for(*this) + ReadyQueue::bytes_for(lanes) +
+  const std::size_t per_worker = OpenTable::bytes_for(*this) +
+                                 ReadyQueue::bytes_for(ready_lanes()) +
                                  WorkerStats::bytes_for(stages.size(), sources.size(), slots);
   return per_worker * workers;
 }

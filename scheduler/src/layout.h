@@ -60,6 +60,10 @@ struct Layout {
   std::size_t block_bytes() const;  // the pool's part of the bound
   std::size_t table_bytes() const;  // the fixed tables
 
+  // Lanes of a ReadyQueue: the policy's, and as many again, behind, for blocks that left before
+  // their time.
+  std::uint32_t ready_lanes() const { return 2 * lanes; }
+
   std::uint32_t workers;
   std::uint32_t slots;
   std::uint64_t in_flight;

@@ -7,13 +7,12 @@ namespace carpool {
 
 void ReadyQueue::push(ReadyBlock* ready) {
   const std::lock_guard guard(lock_);
-  const std::uint32_t lane = ready->lane + (ready->partial ? lanes_ : 0);
-  Lane& head = heads_[lane];
+  Lane& head = heads_[ready->lane];
   ready->newer = nullptr;
   ready->older = head.newest;
   (head.newest != nullptr ? head.newest->newer : head.oldest) = ready;
   head.newest = ready;
-  used_.set(lane);
+  used_.set(ready->lane);
   if (ready->partial) {
     partials_.store(partials_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }

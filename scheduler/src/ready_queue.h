@@ -16,13 +16,12 @@ namespace carpool {
 //
 // Properties and assumptions: push() and take() are the owner's, steal() is everybody's; guarded by
 // a spin lock, which costs an owner about as much as the barriers of a lock-free deque would, once
-// per block of some hundred items; lanes from `lanes` on are for partial blocks, so that every full
-// block comes before every partial one. `size` is readable without the lock by those who look for
-// work.
+// per block of some hundred items; lane 0 is taken first; `size` is readable without the lock by
+// those who look for work.
 class ReadyQueue {
  public:
   ReadyQueue(std::uint32_t lanes, std::atomic<std::uint32_t>& size)
-      : lanes_(lanes), heads_(2 * std::size_t{lanes}), used_(2 * lanes), size_(size) {}
+      : heads_(lanes), used_(lanes), size_(size) {}
 
   void push(ReadyBlock* ready);
 
@@ -40,7 +39,7 @@ class ReadyQueue {
 
   // bytes_for returns how much memory a queue of that many lanes takes; it never changes.
   static std::size_t bytes_for(std::uint32_t lanes) {
-    return 2 * std::size_t{lanes} * sizeof(Lane) + Bitmap(2 * lanes).bytes();
+    return lanes * sizeof(Lane) + Bitmap(lanes).bytes();
   }
 
  private:
@@ -50,7 +49,6 @@ class ReadyQueue {
   };
   ReadyBlock* unlink(std::uint32_t lane, bool newest);
 
-  std::uint32_t lanes_;
   SpinLock lock_;
   std::vector<Lane> heads_;
   Bitmap used_;

@@ -9,6 +9,7 @@
 #include <tbb/task_arena.h>
 
 #include "run_core.h"
+#include "simulated_run.h"
 
 #if defined(__SANITIZE_THREAD__)
 #define CARPOOL_TSAN 1
@@ -127,12 +128,13 @@ class ThreadedRun final : private Summoner {
     bool searching = false;
     do {
       do {
-        hand_over();
-        arena_.execute([&] {  // by another thread, if the arena has no place for this one
+        const auto shift = [this, searching] {
           receive();
           serve_isolated(core_, searching);
           hand_over();
-        });
+        };
+        hand_over();
+        arena_.execute(shift);  // by another thread, if the arena has no place for this one
         receive();
         searching = true;
       } while (core_.gate->leave(true) == Gate::Left::stays);
@@ -150,6 +152,18 @@ class ThreadedRun final : private Summoner {
   std::shared_ptr<const Destination> destination_;
 };
 
+std::uint32_t workers_of(const RunOptions& options) {
+  switch (options.mode) {
+    case RunMode::serial:
+      return 1;
+    case RunMode::simulated:
+      return options.threads == 0 ? 4 : std::min(options.threads, kMostWorkers);
+    case RunMode::threads:
+      break;
+  }
+  return ArenaChoice(options).workers();
+}
+
 RunReport run_serial(const Graph& graph, const RunOptions& options) {
   RunCore core(graph, options, 1, nullptr);
   core.serve(false);
@@ -164,15 +178,16 @@ RunReport run(const Graph& graph, const RunOptions& options) {
   if (options.mode == RunMode::serial) {
     return run_serial(graph, options);
   }
+  if (options.mode == RunMode::simulated) {
+    return SimulatedRun(graph, options, workers_of(options)).run();
+  }
   ArenaChoice choice(options);
   return ThreadedRun(graph, options, choice).run();
 }
 
 std::size_t worst_case_bytes(const Graph& graph, const RunOptions& options) {
   graph.validate();
-  const std::uint32_t workers =
-      options.mode == RunMode::serial ? 1 : ArenaChoice(options).workers();
-  const Layout layout(graph, options, workers);
+  const Layout layout(graph, options, workers_of(options));
   return layout.block_bytes() + layout.table_bytes();
 }
 

@@ -53,7 +53,9 @@ RunCore::RunCore(const Graph& g, const RunOptions& o, std::uint32_t worker_count
       gate(std::make_shared<Gate>(worker_count)),
       credits(o.in_flight),
       pool(layout, o.overflow),
-      linger_ticks(to_ticks(o.flush.linger)),
+      clock(o.mode == RunMode::simulated),
+      linger_ticks(o.mode == RunMode::simulated ? static_cast<std::uint64_t>(o.flush.linger.count())
+                                                : to_ticks(o.flush.linger)),
       summoner_(summoner),
       allowed_(allowed_edges(g)),
       sources_(g.sources().size()),
@@ -73,8 +75,15 @@ void RunCore::serve(bool searching) {
 }
 
 void RunCore::invite() {
-  if (gate->invite() == Gate::Invited::helper) {
-    summoner_->summon();
+  switch (gate->invite()) {
+    case Gate::Invited::helper:
+      summoner_->summon();
+      break;
+    case Gate::Invited::caller:
+      summoner_->caller_called();
+      break;
+    case Gate::Invited::nobody:
+      break;
   }
 }
 

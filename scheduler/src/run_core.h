@@ -23,6 +23,9 @@ class Summoner {
  public:
   virtual void summon() = 0;
 
+  // caller_called tells that the caller of run() has been woken instead.
+  virtual void caller_called() {}
+
  protected:
   ~Summoner() = default;
 };
@@ -78,7 +81,7 @@ class RunCore {
   const std::shared_ptr<Gate> gate;
   Credits credits;
   BlockPool pool;
-  const TickClock clock;
+  RunClock clock;
   const std::uint64_t linger_ticks;  // FlushOptions::linger
 
  private:

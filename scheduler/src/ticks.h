@@ -29,6 +29,8 @@ class TickClock {
  public:
   TickClock() : start_(std::chrono::steady_clock::now()), start_ticks_(read_ticks()) {}
 
+  std::chrono::steady_clock::time_point start() const { return start_; }
+
   double seconds() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
@@ -42,6 +44,29 @@ class TickClock {
  private:
   std::chrono::steady_clock::time_point start_;
   std::uint64_t start_ticks_;
+};
+
+// RunClock is the time of a run: of the machine, or virtual, in nanoseconds, when somebody sets it.
+class RunClock {
+ public:
+  explicit RunClock(bool is_virtual) : virtual_(is_virtual) {}
+
+  std::uint64_t ticks() const { return virtual_ ? virtual_ticks_ : read_ticks(); }
+  double seconds() const {
+    return virtual_ ? 1e-9 * static_cast<double>(virtual_ticks_) : real_.seconds();
+  }
+  double seconds_per_tick() const { return virtual_ ? 1e-9 : real_.seconds_per_tick(); }
+  std::chrono::steady_clock::time_point now() const {
+    return virtual_ ? real_.start() + std::chrono::nanoseconds(virtual_ticks_)
+                    : std::chrono::steady_clock::now();
+  }
+  bool is_virtual() const { return virtual_; }
+  void set_virtual_ticks(std::uint64_t ticks) { virtual_ticks_ = ticks; }
+
+ private:
+  TickClock real_;
+  const bool virtual_;
+  std::uint64_t virtual_ticks_ = 0;
 };
 
 }  // namespace carpool

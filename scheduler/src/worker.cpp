@@ -31,11 +31,11 @@ Worker::Worker(RunCore& core, std::uint32_t index)
       gate_(*core.gate),
       index_(index),
       newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
-      always_timed_(core.options.deadline.has_value() || core.options.flush.linger.count() > 0 ||
-                    core.options.progress != nullptr),
+      always_timed_(core.options.deadline || core.linger_ticks != 0 || core.options.progress ||
+                    core.clock.is_virtual()),
       cache_(core.pool, core.layout),
       credits_(core.credits, core.layout.workers),
-      ready_(core.layout.lanes, core.gate->ready_size(index)),
+      ready_(core.layout.ready_lanes(), core.gate->ready_size(index)),
       open_(core.layout, core.options.policy, cache_, *this),
       stats_(core.layout.stages.size(), core.graph.sources().size(), core.layout.slots),
       next_victim_(index + 1),
@@ -44,39 +44,49 @@ Worker::Worker(RunCore& core, std::uint32_t index)
       linger_ticks_(core.linger_ticks) {}
 
 void Worker::serve(bool searching) {
-  const std::uint64_t came = read_ticks();
-  ++stats_.arrivals;
-  searching_ = searching;
-  search_began_ = now_ = came;
+  begin_shift(searching);
   try {
-    check_end();
-    work_until_idle();
+    Work work;
+    while (!gate_.stopped()) {
+      if (find(work)) {
+        perform(work);
+      } else if (!search()) {
+        break;
+      }
+    }
   } catch (
       ...) {  // from a kernel, a source, a policy or a progress callback, or for lack of memory
     core_.fail(std::current_exception());
   }
+  end_shift();
+}
+
+void Worker::begin_shift(bool searching) {
+  came_ = now_ = search_began_ = core_.clock.ticks();
+  searching_ = searching;
+  ++stats_.arrivals;
+  check_end();
+}
+
+bool Worker::find(Work& work) {
+  if (gate_.stopped() || !acquire(work)) {
+    return false;
+  }
+  if (searching_) {
+    found_work();
+  }
+  return true;
+}
+
+void Worker::end_shift() {
   credits_.return_all();
-  const std::uint64_t left = read_ticks();
+  const std::uint64_t left = core_.clock.ticks();
   if (searching_) {
     stats_.search_ticks += left - search_began_;
   } else {
     gate_.begin_search();  // leave() expects it
   }
-  stats_.present_ticks += left - came;
-}
-
-void Worker::work_until_idle() {
-  Work work;
-  while (!gate_.stopped()) {
-    if (acquire(work)) {
-      if (searching_) {
-        found_work();
-      }
-      perform(work);
-    } else if (!search()) {
-      return;
-    }
-  }
+  stats_.present_ticks += left - came_;
 }
 
 // The order of the whole scheduler is here: what is ready; then new items while credits are plenty,
@@ -101,6 +111,7 @@ void Worker::unpack(ReadyBlock* ready, Work& work) {
   work.block = ready->block;
   work.cause = ready->cause;
   work.is_source = false;
+  work.stolen = false;
   cache_.release(layout_.node_class, reinterpret_cast<std::byte*>(ready));
 }
 
@@ -147,6 +158,7 @@ bool Worker::steal(Work& work) {
     ReadyBlock* rest = list->newer;
     ++stats_.stages[list->block.stage].steals;
     unpack(list, work);
+    work.stolen = true;
     while (rest != nullptr) {
       ReadyBlock* next = rest->newer;
       ++stats_.stages[rest->block.stage].steals;
@@ -161,6 +173,7 @@ bool Worker::steal(Work& work) {
 bool Worker::take_open(Work& work) {
   work.cause = FlushCause::idle;
   work.is_source = false;
+  work.stolen = false;
   return open_.take_best(work.block);
 }
 
@@ -177,14 +190,14 @@ void Worker::run_batch(const Work& work) {
   const Block& block = work.block;
   const bool tiny = block.items < kTinyBatch && !always_timed_;
   const bool timed = !tiny || ++tiny_batches_ >= kTinySample;
-  const std::uint64_t began = timed ? read_ticks() : 0;
+  const std::uint64_t began = timed ? core_.clock.ticks() : 0;
   open_.begin_call(block.stage, core_.allowed_from(block.stage));
   core_.graph.stages()[block.stage].kernel(
       {.data = block.data, .items = block.items, .bin = block.bin, .worker = index_}, open_);
   std::uint64_t ticks = 0;
   if (timed) {
-    now_ = read_ticks();
-    ticks = (now_ - began) * (tiny ? tiny_batches_ : 1);
+    now_ = core_.clock.ticks();
+    ticks = (now_ - began + work.virtual_ticks) * (tiny ? tiny_batches_ : 1);
     tiny_batches_ = tiny ? 0 : tiny_batches_;
   }
   count_batch(work, ticks);
@@ -211,7 +224,7 @@ void Worker::count_batch(const Work& work, std::uint64_t ticks) {
 }
 
 void Worker::call_source(const Work& work) {
-  const std::uint64_t began = read_ticks();
+  const std::uint64_t began = core_.clock.ticks();
   SourceContext context{.worker = index_, .budget = work.budget};
   open_.set_time(began);
   open_.begin_call(
@@ -225,15 +238,18 @@ void Worker::call_source(const Work& work) {
   }
   credits_.settle(static_cast<std::int64_t>(tally >> 32), 0);
   core_.leave_source(work.source, status == SourceStatus::exhausted);
-  now_ = read_ticks();
+  now_ = core_.clock.ticks();
   SourceStats& source = stats_.sources[work.source];
   ++source.calls;
   source.items += tally & 0xffffffffU;
-  source.ticks += now_ - began;
+  source.ticks += now_ - began + work.virtual_ticks;
 }
 
 void Worker::after_call() {
   check_end();
+  if (core_.options.progress) {
+    core_.maybe_report_progress();
+  }
   if (linger_ticks_ != 0) {
     flush_lingering();
   }
@@ -247,12 +263,8 @@ void Worker::after_call() {
 void Worker::check_end() {
   if (core_.options.cancel.cancelled()) {
     core_.end(Outcome::cancelled);
-  } else if (core_.options.deadline &&
-             std::chrono::steady_clock::now() >= *core_.options.deadline) {
+  } else if (core_.options.deadline && core_.clock.now() >= *core_.options.deadline) {
     core_.end(Outcome::deadline);
-  }
-  if (core_.options.progress) {
-    core_.maybe_report_progress();
   }
 }
 
@@ -290,7 +302,9 @@ void Worker::publish(const Block& block, FlushCause cause) {
   ready->block = block;
   ready->cause = cause;
   ready->partial = cause != FlushCause::full && cause != FlushCause::count;
-  ready->lane = lane_of(block);
+  // Full blocks before partial ones. A block that has lingered counts as full: it has waited
+  // enough.
+  ready->lane = lane_of(block) + (cause == FlushCause::asked ? layout_.lanes : 0);
   ready_.push(ready);
   if (gate_.hungry(gate_.view())) {
     core_.invite();
@@ -322,21 +336,11 @@ std::uint32_t Worker::lane_of(const Block& block) const {
 
 // search looks around for a moment. True: try again. False: there is nothing, leave.
 bool Worker::search() {
-  credits_.return_all();  // before looking at the sources: see Gate
-  if (!searching_) {
-    searching_ = true;
-    search_began_ = read_ticks();
-    gate_.begin_search();
-  }
-  if (core_.source_ready()) {
+  if (begin_search()) {
     return true;
   }
-  while (!gate_.stopped() && read_ticks() - search_began_ < kSearchTicks) {
-    const Gate::View seen = gate_.relaxed_view();
-    if (seen.active() <= seen.searching()) {
-      break;  // nobody is at work who could make some
-    }
-    if (gate_.any_ready() || core_.source_ready()) {
+  while (search_goes_on()) {
+    if (sees_work()) {
       return true;
     }
     cpu_pause();
@@ -344,9 +348,30 @@ bool Worker::search() {
   return false;
 }
 
+bool Worker::begin_search() {
+  credits_.return_all();  // before looking at the sources: see Gate
+  if (!searching_) {
+    searching_ = true;
+    search_began_ = core_.clock.ticks();
+    gate_.begin_search();
+  }
+  return core_.source_ready();
+}
+
+bool Worker::search_goes_on() const {
+  const Gate::View seen = gate_.relaxed_view();
+  // Without anybody at work, nothing can turn up.
+  return !gate_.stopped() && core_.clock.ticks() - search_began_ < kSearchTicks &&
+         seen.active() > seen.searching();
+}
+
+bool Worker::sees_work() const {
+  return gate_.any_ready() || core_.source_ready();
+}
+
 void Worker::found_work() {
   searching_ = false;
-  stats_.search_ticks += read_ticks() - search_began_;
+  stats_.search_ticks += core_.clock.ticks() - search_began_;
   // Others kept quiet while somebody was searching. If that was the last searcher and there is
   // more, call the next.
   if (gate_.hungry(gate_.end_search()) && gate_.any_ready()) {

@@ -28,19 +28,29 @@ class Worker final : private BlockSink {
   // drop_all forgets every block and returns how many items were in them. After the run only.
   std::uint64_t drop_all();
 
- private:
-  friend class RunCore;
-
   // What to do next: a batch to run, or a source to call.
   struct Work {
     Block block;
     FlushCause cause = FlushCause::full;
     bool is_source = false;
+    bool stolen = false;
     std::uint32_t source = 0;
     std::uint32_t budget = 0;
+    std::uint64_t virtual_ticks = 0;  // what it costs in a simulation
   };
 
-  void work_until_idle();
+  // The steps of serve(), for who wants to interleave workers. A shift begins and ends with the
+  // worker's seat; find() takes work out of the queues, perform() does it; begin_search() and
+  // sees_work() tell whether to try again, search_goes_on() whether to wait for that.
+  void begin_shift(bool searching);
+  bool find(Work& work);
+  void perform(const Work& work);
+  bool begin_search();
+  bool search_goes_on() const;
+  bool sees_work() const;
+  void end_shift();
+
+ private:
   bool acquire(Work& work);
   bool take_ready(Work& work);
   bool take_source(Work& work, bool last_resort);
@@ -48,7 +58,6 @@ class Worker final : private BlockSink {
   bool take_open(Work& work);
   void unpack(ReadyBlock* ready, Work& work);
 
-  void perform(const Work& work);
   void run_batch(const Work& work);
   void call_source(const Work& work);
   void count_batch(const Work& work, std::uint64_t ticks);
@@ -86,6 +95,7 @@ class Worker final : private BlockSink {
   std::uint32_t taken_back_ = 0;   // how many of them nobody took
   const std::uint64_t linger_ticks_;
   std::uint64_t search_began_ = 0;
+  std::uint64_t came_ = 0;
 };
 
 }  // namespace carpool

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -76,22 +77,23 @@ TEST(ArenaTest, RunsInsideKernels) {
 
 // An arena whose other threads never come: the caller alone must get everything done.
 TEST(ArenaTest, ProgressNeedsNoSecondThread) {
+  struct Occupation {
+    std::atomic<bool> begun{false};
+    std::atomic<bool> end{false};
+  };
+  const auto occupation = std::make_shared<Occupation>();  // the task may outlive the test
   tbb::task_arena arena(2);
-  std::atomic<bool> blocked{false};
-  std::atomic<bool> release{false};
-  arena.enqueue([&] {
-    blocked = true;
-    while (!release) {
-      std::this_thread::yield();
-    }
+  arena.enqueue([occupation] {
+    occupation->begun = true;
+    occupation->begun.notify_one();
+    occupation->end.wait(false);
   });
-  while (!blocked) {
-    std::this_thread::yield();
-  }
+  occupation->begun.wait(false);
   RandomGraph random({.seed = 11, .items = 5000});
   carpool::run(random.graph(), {.arena = &arena, .in_flight = 500});
   EXPECT_EQ(random.counted(), random.expected());
-  release = true;
+  occupation->end = true;
+  occupation->end.notify_one();
 }
 
 TEST(ArenaTest, ManyShortRuns) {

@@ -1,0 +1,166 @@
+// The event loop of a simulated run.
+#include "simulated_run.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace carpool {
+namespace {
+constexpr std::uint32_t kCaller = 0;
+constexpr double kLookSeconds = 1e-6;  // between two looks of a searching worker
+}  // namespace
+
+SimulatedRun::SimulatedRun(const Graph& graph, const RunOptions& options, std::uint32_t workers)
+    : settings_(options.simulation),
+      core_(graph, options, workers, this),
+      threads_(workers),
+      random_state_(options.simulation.seed) {}
+
+RunReport SimulatedRun::run() {
+  sit_down(kCaller, false);
+  while (!events_.empty()) {
+    const Event event = events_.top();
+    events_.pop();
+    now_ = event.time;
+    core_.clock.set_virtual_ticks(now_);
+    step(event.thread);
+  }
+  if (!core_.gate->view().closed()) {
+    throw std::logic_error("carpool: the simulated run with seed " +
+                           std::to_string(settings_.seed) +
+                           " has come to a standstill; this is a bug in the scheduler");
+  }
+  return core_.report();
+}
+
+void SimulatedRun::step(std::uint32_t thread) {
+  const Next next = std::exchange(threads_[thread].next, Next::nothing);
+  try {
+    switch (next) {
+      case Next::arrive:
+        return arrive(thread);
+      case Next::find:
+        return find(thread);
+      case Next::perform:
+        core_.worker(threads_[thread].seat).perform(threads_[thread].work);
+        return schedule(thread, Next::find, settings_.choose_seconds);
+      case Next::look:
+        return look(thread);
+      case Next::nothing:
+        return;
+    }
+  } catch (...) {
+    core_.fail(std::current_exception());
+    leave(thread);
+  }
+}
+
+void SimulatedRun::arrive(std::uint32_t thread) {
+  if (thread == kCaller &&
+      !core_.gate->wait_for_invitation()) {  // does not wait: the signal is set
+    return;
+  }
+  threads_[thread].away = true;
+  if (core_.gate->enter()) {
+    sit_down(thread, true);
+  }
+}
+
+void SimulatedRun::sit_down(std::uint32_t thread, bool searching) {
+  threads_[thread].away = false;
+  threads_[thread].seat = core_.gate->take_seat();
+  core_.worker(threads_[thread].seat).begin_shift(searching);
+  schedule(thread, Next::find, settings_.choose_seconds);
+}
+
+void SimulatedRun::find(std::uint32_t thread) {
+  Thread& self = threads_[thread];
+  Worker& worker = core_.worker(self.seat);
+  if (worker.find(self.work)) {
+    const double seconds = jittered(cost(self.work));
+    self.work.virtual_ticks = static_cast<std::uint64_t>(seconds * 1e9);
+    const double extra = self.work.stolen ? settings_.steal_seconds : 0.0;
+    self.next = Next::perform;
+    events_.push({now_ + self.work.virtual_ticks + static_cast<std::uint64_t>(extra * 1e9),
+                  random(), thread});
+  } else if (core_.gate->stopped()) {
+    leave(thread);
+  } else if (worker.begin_search()) {
+    schedule(thread, Next::find, settings_.choose_seconds);
+  } else {
+    look(thread);
+  }
+}
+
+void SimulatedRun::look(std::uint32_t thread) {
+  const Worker& worker = core_.worker(threads_[thread].seat);
+  if (!worker.search_goes_on()) {
+    leave(thread);
+  } else if (worker.sees_work()) {
+    schedule(thread, Next::find, settings_.choose_seconds);
+  } else {
+    schedule(thread, Next::look, kLookSeconds);
+  }
+}
+
+void SimulatedRun::leave(std::uint32_t thread) {
+  Thread& self = threads_[thread];
+  core_.worker(self.seat).end_shift();
+  core_.gate->release_seat(self.seat);
+  self.away = true;
+  if (core_.gate->leave(thread == kCaller) == Gate::Left::stays) {
+    sit_down(thread, true);
+  }
+}
+
+void SimulatedRun::schedule(std::uint32_t thread, Next next, double seconds) {
+  threads_[thread].next = next;
+  const auto ticks = static_cast<std::uint64_t>(jittered(seconds) * 1e9);
+  events_.push({now_ + std::max<std::uint64_t>(1, ticks), random(), thread});
+}
+
+double SimulatedRun::cost(const Worker::Work& work) const {
+  if (work.is_source) {
+    return settings_.source_item_seconds * work.budget;
+  }
+  if (settings_.batch_seconds) {
+    return settings_.batch_seconds(work.block.stage, work.block.items);
+  }
+  return 100e-9 + 20e-9 * work.block.items;
+}
+
+std::uint64_t SimulatedRun::random() {
+  random_state_ += 0x9e3779b97f4a7c15ULL;  // splitmix64
+  std::uint64_t x = random_state_;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
+  return x ^ (x >> 31);
+}
+
+double SimulatedRun::jittered(double seconds) {
+  const double unit = static_cast<double>(random() >> 11) * 0x1p-53;  // 0..1
+  return seconds * (1.0 + settings_.jitter * (2.0 * unit - 1.0));
+}
+
+void SimulatedRun::summon() {
+  // The gate counts: when it books an invitation there is a thread that is neither here nor called.
+  const auto count = static_cast<std::uint32_t>(threads_.size());
+  const auto first = static_cast<std::uint32_t>(random() % count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t thread = (first + i) % count;
+    if (thread != kCaller && threads_[thread].away) {
+      threads_[thread].away = false;
+      schedule(thread, Next::arrive, settings_.wake_seconds);
+      return;
+    }
+  }
+  throw std::logic_error("carpool: the gate invited more helpers than there are");
+}
+
+void SimulatedRun::caller_called() {
+  schedule(kCaller, Next::arrive, settings_.wake_seconds);
+}
+
+}  // namespace carpool

@@ -1,0 +1,326 @@
+// The smaller promises of the manual: order, alignment, causes, reports, refusals, no allocation.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "allocations.h"
+#include "carpool/carpool.h"
+#include "random_graph.h"
+
+namespace {
+
+using carpool::Batch;
+using carpool::Emitter;
+using carpool::FlushCause;
+using carpool::SourceContext;
+using carpool::SourceStatus;
+
+carpool::RunOptions serial(carpool::Policy policy = carpool::Policy::deepest_first()) {
+  return {.policy = std::move(policy), .mode = carpool::RunMode::serial};
+}
+
+std::uint64_t flushes(const carpool::StageReport& stage, FlushCause cause) {
+  return stage.flushes_by_cause[static_cast<std::size_t>(cause)];
+}
+
+// Three stages with full and partial blocks; returns the order in which batches ran, as
+// "stage:items".
+std::string order_of(carpool::Policy policy) {
+  carpool::Graph graph;
+  std::string order;
+  std::vector<carpool::StageHandle<int>> stages;
+  for (int rank : {1, 3, 2}) {
+    stages.push_back(graph.add_stage<int>(
+        {.name = std::to_string(rank), .bins = 2, .block_items = 4, .rank = rank}));
+  }
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    graph.set_kernel(stages[i], [&, i](const Batch<int>& batch, Emitter&) {
+      order += (order.empty() ? "" : " ") + std::string(1, "abc"[i]) + ":" +
+               std::to_string(batch.items.size());
+    });
+  }
+  graph.add_source({.name = "once"}, [&](SourceContext&, Emitter& out) {
+    const std::vector<int> items(6, 7);
+    out.emit(stages[0], 0, std::span(items));           // a: a full block and two items
+    out.emit(stages[1], 0, std::span(items).first(1));  // b: one item
+    out.emit(stages[2], 1, std::span(items).first(5));  // c: a full block and one item
+    return SourceStatus::exhausted;
+  });
+  carpool::run(graph, serial(std::move(policy)));
+  return order;
+}
+
+TEST(PolicyTest, EachHasItsOrder) {
+  // Blocks are published as they become full, which needs one more item: a:4 at the fifth item, c:4
+  // likewise.
+  EXPECT_EQ(order_of(carpool::Policy::deepest_first()), "c:4 a:4 b:1 c:1 a:2");
+  EXPECT_EQ(order_of(carpool::Policy::oldest_first()), "a:4 c:4 a:2 b:1 c:1");
+  EXPECT_EQ(order_of(carpool::Policy::custom(
+                "stage", 3, [](const carpool::BlockInfo& block) { return block.stage; })),
+            "a:4 c:4 a:2 b:1 c:1");
+  EXPECT_EQ(order_of(carpool::Policy::custom(
+                "reversed", 3, [](const carpool::BlockInfo& block) { return 2 - block.stage; })),
+            "c:4 a:4 c:1 b:1 a:2");
+}
+
+TEST(PolicyTest, FullestFirstTakesTheLongestBatch) {
+  carpool::Graph graph;
+  const auto stage = graph.add_stage<int>({.name = "s", .bins = 4, .block_items = 256});
+  std::vector<std::size_t> lengths;
+  graph.set_kernel(
+      stage, [&](const Batch<int>& batch, Emitter&) { lengths.push_back(batch.items.size()); });
+  graph.add_source({.name = "once"}, [&](SourceContext&, Emitter& out) {
+    const std::vector<int> items(100, 7);
+    out.emit(stage, 0, std::span(items).first(1));
+    out.emit(stage, 1, std::span(items).first(20));
+    out.emit(stage, 2, std::span(items).first(100));
+    out.emit(stage, 3, std::span(items).first(5));
+    return SourceStatus::exhausted;
+  });
+  carpool::run(graph, serial(carpool::Policy::fullest_first()));
+  EXPECT_EQ(lengths, (std::vector<std::size_t>{100, 20, 5, 1}));
+}
+
+TEST(PolicyTest, BadOnesAreRefused) {
+  EXPECT_THROW(carpool::Policy::custom("x", 0, [](const carpool::BlockInfo&) { return 0U; }),
+               std::invalid_argument);
+  EXPECT_THROW(carpool::Policy::custom("x", 1, nullptr), std::invalid_argument);
+}
+
+TEST(SerialTest, IsTheSameEveryTime) {
+  const auto once = [] {
+    carpool_test::RandomGraph random({.seed = 5, .items = 5000, .fan_out = 3});
+    const auto report = carpool::run(random.graph(), serial());
+    std::vector<std::uint64_t> numbers;
+    for (const auto& stage : report.stages) {
+      numbers.push_back(stage.batches);
+      for (const auto& bin : stage.bins) {
+        numbers.push_back(bin.batches);
+        numbers.push_back(bin.items);
+      }
+    }
+    return numbers;
+  };
+  EXPECT_EQ(once(), once());
+}
+
+TEST(BatchTest, IsAlignedAndNeverLongerThanTheBlock) {
+  struct Odd {
+    std::uint8_t bytes[13];
+  };
+  carpool::Graph graph;
+  const auto stage = graph.add_stage<Odd>({.name = "odd", .bins = 5, .block_items = 37});
+  graph.set_kernel(stage, [&](const Batch<Odd>& batch, Emitter&) {
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(batch.items.data()) % 64, 0U);
+    EXPECT_LE(batch.items.size(), 37U);
+    for (const Odd& item : batch.items) {
+      EXPECT_EQ(item.bytes[12], batch.bin);
+    }
+  });
+  std::uint32_t next = 0;
+  graph.add_source({.name = "s"}, [&](SourceContext& ctx, Emitter& out) {
+    for (std::uint32_t i = 0; i < ctx.budget; ++i, ++next) {
+      Odd odd{};
+      odd.bytes[12] = static_cast<std::uint8_t>(next % 5);
+      out.emit(stage, next % 5, odd);
+    }
+    return next < 5000 ? SourceStatus::more : SourceStatus::exhausted;
+  });
+  const auto report = carpool::run(graph, {.threads = 2});
+  EXPECT_EQ(report.stages[0].items, next);
+}
+
+// One source call of `count` items to one bin.
+carpool::RunReport run_of(std::uint32_t count, carpool::StageOptions stage_options,
+                          carpool::RunOptions options) {
+  carpool::Graph graph;
+  const auto stage = graph.add_stage<std::uint32_t>(std::move(stage_options));
+  graph.set_kernel(stage, [](const Batch<std::uint32_t>&, Emitter&) {});
+  graph.add_source({.name = "s", .burst = 100'000}, [=](SourceContext&, Emitter& out) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      out.emit(stage, 0, i);
+    }
+    return SourceStatus::exhausted;
+  });
+  return carpool::run(graph, options);
+}
+
+TEST(ReportTest, CountsSeatsRunsAndCauses) {
+  const auto report = run_of(250, {.name = "s", .block_items = 100, .lanes = 8}, serial());
+  const auto& stage = report.stages[0];
+  EXPECT_EQ(stage.batches, 3U);  // 100, 100, 50
+  EXPECT_EQ(flushes(stage, FlushCause::full), 2U);
+  EXPECT_EQ(flushes(stage, FlushCause::idle), 1U);
+  EXPECT_DOUBLE_EQ(stage.run_length, 250.0 / 3);
+  EXPECT_DOUBLE_EQ(stage.seats_filled, 250.0 / (104 + 104 + 56));
+  EXPECT_EQ(stage.bins[0].items, 250U);
+  EXPECT_EQ(report.sources[0].items, 250U);
+  EXPECT_EQ(report.sources[0].calls, 1U);
+  EXPECT_LE(report.kernel_seconds + report.source_seconds + report.scheduler_seconds,
+            report.seconds * 1.01);
+}
+
+TEST(ReportTest, FlushByCount) {
+  carpool::RunOptions options = serial();
+  options.flush.count = 10;
+  const auto report = run_of(95, {.name = "s", .block_items = 100}, options);
+  EXPECT_EQ(report.stages[0].batches, 10U);
+  EXPECT_EQ(flushes(report.stages[0], FlushCause::count), 9U);
+}
+
+// A stage that makes more of itself keeps the worker busy; the lone item leaves because of its age.
+TEST(ReportTest, FlushByAge) {
+  carpool::Graph graph;
+  const auto busy = graph.add_stage<int>({.name = "busy", .block_items = 1, .rank = 5});
+  const auto lone = graph.add_stage<int>({.name = "lone", .block_items = 8, .rank = 1});
+  bool lone_ran = false;
+  bool first = true;
+  graph.set_kernel(busy, [&](const Batch<int>&, Emitter& out) {
+    if (first) {
+      out.emit(lone, 0, 1);
+      first = false;
+    }
+    if (!lone_ran) {
+      out.emit(busy, 0, 1);
+      out.emit(busy, 0, 1);  // makes the first one full and published
+    }
+  });
+  graph.set_kernel(lone, [&](const Batch<int>&, Emitter&) { lone_ran = true; });
+  graph.add_source({.name = "s", .fan_out = 100'000, .burst = 10},
+                   [&](SourceContext&, Emitter& out) {
+                     out.emit(busy, 0, 1);
+                     return SourceStatus::exhausted;
+                   });
+  carpool::RunOptions options{.in_flight = 10'000'000,
+                              .policy = carpool::Policy::oldest_first(),
+                              .flush = {.linger = std::chrono::microseconds(50)},
+                              .mode = carpool::RunMode::serial};
+  const auto report = carpool::run(graph, options);
+  EXPECT_EQ(flushes(report.stages[1], FlushCause::linger), 1U);
+}
+
+TEST(ReportTest, PrintsAndWritesJson) {
+  carpool_test::RandomGraph random({.seed = 2});
+  const auto report = carpool::run(random.graph(), {.threads = 2});
+  std::ostringstream text;
+  report.print(text);
+  EXPECT_NE(text.str().find("seats"), std::string::npos);
+  const std::string json = report.to_json();
+  EXPECT_EQ(std::count(json.begin(), json.end(), '{'), std::count(json.begin(), json.end(), '}'));
+  EXPECT_EQ(std::count(json.begin(), json.end(), '['), std::count(json.begin(), json.end(), ']'));
+  for (const char* key :
+       {"\"stages\":", "\"bins\":", "\"workers\":", "\"peak_bytes\":", "\"flushes_by_cause\":"}) {
+    EXPECT_NE(json.find(key), std::string::npos) << key;
+  }
+  EXPECT_LT(report.to_json(0).size(), json.size());
+}
+
+TEST(ReportTest, SaysWhenKeysAreTooMany) {
+  carpool_test::RandomGraph random({.seed = 2, .stages = 1, .most_bins = 5000, .items = 20'000});
+  const auto report = carpool::run(random.graph(), {.threads = 1, .in_flight = 100});
+  ASSERT_FALSE(report.notes.empty());
+  EXPECT_NE(report.notes[0].find("too many"), std::string::npos);
+}
+
+TEST(ReportTest, ProgressIsCalledAndItsExceptionsArrive) {
+  carpool_test::RandomGraph random({.seed = 2, .items = 20'000});
+  std::atomic<int> calls{0};
+  carpool::RunOptions options{.threads = 3, .progress_every = std::chrono::milliseconds(0)};
+  std::uint64_t last = 0;
+  options.progress = [&](const carpool::Progress& progress) {
+    ++calls;
+    last = std::max(last, progress.item_visits);  // not atomic: calls do not overlap
+  };
+  const auto report = carpool::run(random.graph(), options);
+  EXPECT_GT(calls.load(), 0);
+  EXPECT_GT(last, 0U);
+  EXPECT_LE(last, report.stages[0].items + report.stages[1].items + report.stages[2].items +
+                      report.stages[3].items);
+
+  carpool_test::RandomGraph again({.seed = 2, .items = 20'000});
+  options.progress = [](const carpool::Progress&) { throw std::runtime_error("progress"); };
+  EXPECT_THROW(carpool::run(again.graph(), options), std::runtime_error);
+}
+
+TEST(AllocationTest, NoneInSteadyState) {
+  if (!carpool_test::counts_allocations()) {
+    GTEST_SKIP() << "a sanitizer has replaced operator new";
+  }
+  const auto count = [](std::uint32_t items) {
+    carpool_test::RandomGraph random({.seed = 4, .most_bins = 200, .items = items, .fan_out = 4});
+    const std::uint64_t before = carpool_test::allocation_count();
+    carpool::run(random.graph(), {.in_flight = 2000, .mode = carpool::RunMode::serial});
+    return carpool_test::allocation_count() - before;
+  };
+  count(1000);  // whatever is set up once per process
+  EXPECT_GT(count(1000), 0U);
+  EXPECT_LE(count(400'000), count(40'000) + 8);  // a slab or two at most, for ten times the work
+}
+
+TEST(GraphTest, DrawsItself) {
+  carpool_test::RandomGraph random({.seed = 2, .stages = 2});
+  const std::string dot = random.graph().dot();
+  EXPECT_EQ(dot.rfind("digraph", 0), 0U);
+  EXPECT_NE(dot.find("stage0 -> stage1"), std::string::npos);
+  EXPECT_NE(dot.find("source0 -> stage0"), std::string::npos);
+}
+
+TEST(GraphTest, RefusesWhatMakesNoSense) {
+  carpool::Graph graph;
+  EXPECT_THROW(graph.add_stage<int>({.name = "x", .bins = 0}), std::invalid_argument);
+  EXPECT_THROW(graph.add_stage<int>({.name = "x", .block_items = 0}), std::invalid_argument);
+  EXPECT_THROW(graph.add_source({.name = "x"}, nullptr), std::invalid_argument);
+  EXPECT_THROW(carpool::run(graph), std::invalid_argument);  // nothing in it
+  const auto stage = graph.add_stage<int>({.name = "lonely"});
+  graph.add_source({.name = "s"}, [](SourceContext&, Emitter&) { return SourceStatus::exhausted; });
+  try {
+    carpool::run(graph);
+    FAIL() << "a stage without kernel ran";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("lonely"), std::string::npos);
+  }
+  graph.set_kernel(stage, [](const Batch<int>&, Emitter&) {});
+  EXPECT_EQ(carpool::run(graph).stages[0].items, 0U);
+}
+
+TEST(EmitterTest, RefusesBinsAndHandlesThatDoNotExist) {
+  for (const bool use_default_handle : {false, true}) {
+    carpool::Graph graph;
+    const auto stage = graph.add_stage<int>({.name = "s", .bins = 3});
+    graph.set_kernel(stage, [](const Batch<int>&, Emitter&) {});
+    graph.add_source({.name = "s"}, [&](SourceContext&, Emitter& out) {
+      if (use_default_handle) {
+        out.emit(carpool::StageHandle<int>(), 0, 1);
+      } else {
+        out.emit(stage, 3, 1);
+      }
+      return SourceStatus::exhausted;
+    });
+    EXPECT_THROW(carpool::run(graph), std::out_of_range);
+  }
+}
+
+#ifndef NDEBUG
+TEST(EmitterTest, RefusesUndeclaredEdges) {
+  carpool::Graph graph;
+  const auto a = graph.add_stage<int>({.name = "a"});
+  const auto b = graph.add_stage<int>({.name = "b"});
+  graph.set_kernel(a, [&](const Batch<int>&, Emitter& out) { out.emit(b, 0, 1); });
+  graph.set_kernel(b, [](const Batch<int>&, Emitter&) {});
+  graph.add_source({.name = "s"}, [&](SourceContext&, Emitter& out) {
+    out.emit(a, 0, 1);
+    return SourceStatus::exhausted;
+  });
+  EXPECT_EQ(carpool::run(graph).stages[1].items, 1U);  // nothing declared: nothing refused
+  graph.add_edge(a, a);
+  EXPECT_THROW(carpool::run(graph), std::logic_error);
+  graph.add_edge(a, b);
+  EXPECT_EQ(carpool::run(graph).stages[1].items, 1U);
+}
+#endif
+
+}  // namespace
