@@ -105,8 +105,8 @@ std::vector<LightQuery> RandomNumbers(size_t count, uint32_t seed) {
 /// Integral over the sphere of f(u, v), by the midpoint rule on a grid that divides every texel alike.
 template <class F>
 double OverSphere(const Map& map, const F& f) {
-  const int nu = map.width * std::max(2, 512 / map.width);
-  const int nv = map.height * std::max(2, 512 / map.height);
+  const int nu = map.width * std::max(2, 256 / map.width);
+  const int nv = map.height * std::max(2, 256 / map.height);
   double sum = 0;
   for (int j = 0; j < nv; ++j) {
     const double v = (j + 0.5) / nv;

@@ -50,7 +50,7 @@ double Irradiance(const LightResult& r, const LightQuery& q, double emission) {
 double MeanIrradiance(const LightScene& s, const LightRunner& runner, const LightQuery& receiver,
                       double emission, MeanEstimate& estimate) {
   for (const LightResult& r : runner.run(LightKernel::sample_light, s.view,
-                                         WithRandomNumbers(receiver, 400000, 61))) {
+                                         WithRandomNumbers(receiver, 50000, 61))) {
     estimate.Add(Irradiance(r, receiver, emission));
   }
   return estimate.mean();
@@ -94,7 +94,7 @@ TEST(LightSample, IrradianceOfEveryKindTogether) {
     for (const bool all_sides : {false, true}) {
       const LightQuery receiver = LookingUp();
       MeanEstimate estimate;
-      auto queries = WithRandomNumbers(receiver, 400000, 62);
+      auto queries = WithRandomNumbers(receiver, 200000, 62);
       if (all_sides) {
         for (LightQuery& q : queries) q.normal[1] = 0;
       }
@@ -149,7 +149,7 @@ TEST(LightSample, ALightWithOneSideGivesNothingBehindIt) {
       s.Build();
       MeanEstimate estimate;
       const double mean = MeanIrradiance(s, BestLightRunner(), LookingUp(), 1, estimate);
-      EXPECT_NEAR(mean, faces_down || two_sided ? kSquareIrradiance : 0, 0.01);
+      EXPECT_NEAR(mean, faces_down || two_sided ? kSquareIrradiance : 0, 0.02);
     }
   }
 }

@@ -40,7 +40,7 @@ TEST(LightTree, ProbabilitiesSumToOneOverTwelveDecades) {
   std::mt19937 rng(32);
   for (const LightRunner& runner : AllLightRunners()) {
     if (runner.name.ends_with("x1")) continue;  // the same bits: WidthDoesNotMatter
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < 2; ++i) {
       const LightQuery receiver = RandomReceiver(rng, i);
       double sum = 0;
       for (const double p : Probabilities(runner, s, receiver)) sum += p;
@@ -67,6 +67,7 @@ TEST(LightTree, ProbabilitiesSumToOneExactlyWhereAllLightsShineEverywhere) {
   }
   s.Build();
   for (const LightRunner& runner : AllLightRunners()) {
+    if (runner.name.ends_with("x1")) continue;  // the same bits: WidthDoesNotMatter
     double sum = 0;
     for (const double p : Probabilities(runner, s, RandomReceiver(rng, 0))) {
       ASSERT_GT(p, 0);
@@ -77,11 +78,11 @@ TEST(LightTree, ProbabilitiesSumToOneExactlyWhereAllLightsShineEverywhere) {
 }
 
 TEST(LightTree, PicksFollowTheProbabilities) {
-  constexpr size_t kPicks = 1000000;
+  constexpr size_t kPicks = 500000;
   const LightScene few = RandomLights(300, 12, 35), many = RandomLights(20000, 3, 36);
   std::mt19937 rng(37);
   for (const LightScene* s : {&few, &many}) {
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < 2; ++i) {
       const LightQuery receiver = RandomReceiver(rng, i);
       std::vector<double> expected = Probabilities(BestLightRunner(), *s, receiver);
       double sum = 0;
