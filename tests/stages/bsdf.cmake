@@ -4,6 +4,7 @@ add_executable(test-bsdf
   ${CMAKE_CURRENT_LIST_DIR}/bsdf_departures_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bsdf_energy_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bsdf_kernels.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/bsdf_lobes_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bsdf_sampling_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bsdf_tables_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/bsdf_value_test.cpp)
