@@ -188,6 +188,25 @@ TEST(Bsdf, ExtremesAreFinite) {
   ExpectFiniteExtremes();
 }
 
+// Hard case 31, for lobes: the ends of [0, 1) never choose a lobe of weight zero, and always choose some lobe.
+TEST(Bsdf, EndsOfTheUnitIntervalChooseARealLobe) {
+  Surface lambert = WhiteDielectric(0.3);
+  lambert.specular = 0;
+  Columns u = IndependentUniforms(3, 1024, 14);
+  for (const BsdfKernels& kernels : AllBsdfKernels()) {
+    SCOPED_TRACE(kernels.name);
+    for (const double end : {0.0, 1 - 0x1p-24}) {
+      u[0].assign(1024, end);
+      const Columns diffuse = kernels.sample(lambert, OutgoingAt(0.7), u);
+      const Columns metal = kernels.sample(WhiteMetal(0.1), OutgoingAt(0.7), u);
+      for (size_t i = 0; i < 1024; ++i) {
+        ASSERT_EQ(diffuse[kValid][i], 1) << end;
+        ASSERT_EQ(metal[kValid][i], 1) << end;
+      }
+    }
+  }
+}
+
 TEST(Bsdf, BelowTheSurfaceIsZero) {
   const Columns wo = RandomHemisphere(64, 8);
   Columns wi = RandomHemisphere(64, 9);
