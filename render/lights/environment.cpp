@@ -14,13 +14,18 @@
 namespace carpool::render {
 namespace {
 
-double Luminance(const float* rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
+double Luminance(const float* rgb) {
+  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
 
-double SinTheta(int row, int height) { return std::sin(std::numbers::pi * (row + 0.5) / height); }
+double SinTheta(int row, int height) {
+  return std::sin(std::numbers::pi * (row + 0.5) / height);
+}
 
-/// Exclusive cumulative integer masses in proportion to `weights`; `weights` become probabilities. Every
-/// weight above 0 gets a mass of 1 beforehand, so that rounding never makes a light impossible to find;
-/// the rest is dealt by rounding the cumulative sum, which keeps each within 1 of its due.
+/// Exclusive cumulative integer masses in proportion to `weights`; `weights` become probabilities.
+/// Every weight above 0 gets a mass of 1 beforehand, so that rounding never makes a light
+/// impossible to find; the rest is dealt by rounding the cumulative sum, which keeps each within 1
+/// of its due.
 void Apportion(std::span<double> weights, int32_t* cdf) {
   double total = 0;
   int32_t positive = 0;

@@ -10,7 +10,9 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-double Dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double Dot(const Point3& a, const Point3& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 double Distance(const Point3& a, const Point3& b) {
   const Point3 d = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -22,7 +24,8 @@ struct Cone {
   double theta;
 };
 
-/// `axis` turned by `angle` towards `to`, which is at `cos` from it; false where they are (anti)parallel.
+/// `axis` turned by `angle` towards `to`, which is at `cos` from it; false where they are
+/// (anti)parallel.
 bool TurnTowards(Point3& axis, const Point3& to, double cos, double angle) {
   Point3 side;
   for (int i = 0; i < 3; ++i) side[i] = to[i] - cos * axis[i];
@@ -46,7 +49,8 @@ Cone UnionOfCones(Cone a, Cone b) {
   const double theta = (a.theta + between + b.theta) / 2;
   if (theta >= kPi) return {a.axis, kPi};
   if (!TurnTowards(a.axis, b.axis, cos, theta - a.theta)) {
-    // Parallel axes whose angles differ by rounding keep the wider cone; opposite ones fill the sphere.
+    // Parallel axes whose angles differ by rounding keep the wider cone; opposite ones fill the
+    // sphere.
     return cos > 0 ? a : Cone{a.axis, kPi};
   }
   return {a.axis, theta};
@@ -76,7 +80,8 @@ LightCluster Union(const LightCluster& a, const LightCluster& b) {
   u.two_sided = a.two_sided || b.two_sided;
   Point3 other = b.axis;
   if (u.two_sided && Dot(a.axis, b.axis) < 0) {
-    for (double& c : other) c = -c;  // both senses of the union's cone count, so the nearer one will do
+    for (double& c : other)
+      c = -c;  // both senses of the union's cone count, so the nearer one will do
   }
   const Cone cone = UnionOfCones({a.axis, a.theta_o}, {other, b.theta_o});
   u.axis = cone.axis;
@@ -84,8 +89,8 @@ LightCluster Union(const LightCluster& a, const LightCluster& b) {
   u.theta_e = std::max(a.theta_e, b.theta_e);
   u.power = a.power + b.power;
   const Point3 center = Center(u);
-  const double around_both = std::max(Distance(center, Center(a)) + a.radius,
-                                      Distance(center, Center(b)) + b.radius);
+  const double around_both =
+      std::max(Distance(center, Center(a)) + a.radius, Distance(center, Center(b)) + b.radius);
   u.radius = std::min(around_both, Distance(u.lo, u.hi) / 2);
   return u;
 }
@@ -93,7 +98,8 @@ LightCluster Union(const LightCluster& a, const LightCluster& b) {
 double Cost(const LightCluster& c) {
   if (c.power <= 0) return 0;
   const double x = c.hi[0] - c.lo[0], y = c.hi[1] - c.lo[1], z = c.hi[2] - c.lo[2];
-  // Lights in one line have no surface; a share of the squared diagonal still tells long from short.
+  // Lights in one line have no surface; a share of the squared diagonal still tells long from
+  // short.
   const double area = 2 * (x * y + y * z + z * x) + 0.01 * (x * x + y * y + z * z);
   return c.power * OrientationMeasure(c) * area;
 }

@@ -25,8 +25,8 @@ Point3 Center(const LightCluster& cluster);
 /// The least cluster of this form, or nearly so, that holds both; either may be empty.
 LightCluster Union(const LightCluster& a, const LightCluster& b);
 
-/// The surface area orientation heuristic's measure: power x solid angle of the directions that are shone
-/// into x surface area.
+/// The surface area orientation heuristic's measure: power x solid angle of the directions that are
+/// shone into x surface area.
 double Cost(const LightCluster& cluster);
 
 }  // namespace carpool::render

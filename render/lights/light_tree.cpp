@@ -22,15 +22,23 @@ using stages::LightType;
 
 constexpr double kPi = std::numbers::pi;
 constexpr size_t kParallelAbove = 4096;  // lights of a subtree that is worth a task
-constexpr int kDeep = 32;                // past this depth halves are equal: depth stays below 32 + log2(n)
+constexpr int kDeep = 32;  // past this depth halves are equal: depth stays below 32 + log2(n)
 
-Point3 Wide(const float p[3]) { return {p[0], p[1], p[2]}; }
-Point3 Minus(const Point3& a, const Point3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Point3 Wide(const float p[3]) {
+  return {p[0], p[1], p[2]};
+}
+Point3 Minus(const Point3& a, const Point3& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
 Point3 Cross(const Point3& a, const Point3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-double Length(const Point3& a) { return std::hypot(a[0], a[1], a[2]); }
-double Luminance(const float c[3]) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; }
+double Length(const Point3& a) {
+  return std::hypot(a[0], a[1], a[2]);
+}
+double Luminance(const float c[3]) {
+  return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+}
 
 /// The direction in unit length, or -Z where it has none.
 Point3 UnitOr(const Point3& a) {
@@ -107,7 +115,8 @@ void AddTriangles(stages::SceneTables& scene, std::span<const TriangleEmission> 
     const bool first = t.placement != placement;
     if (t.primitive != (first ? 0 : next) || t.placement < 0 ||
         static_cast<size_t>(t.placement) >= scene.geometry.placements.size()) {
-      throw std::invalid_argument("emissive triangles must come placement by placement, all of each");
+      throw std::invalid_argument(
+          "emissive triangles must come placement by placement, all of each");
     }
     stages::Placement& place = scene.geometry.placements[t.placement];
     const int32_t light = static_cast<int32_t>(scene.lights.lights.size());
@@ -235,7 +244,8 @@ void ChooseProbabilities(stages::LightTables& tables, double tree, double infini
   tables.infinite_probability =
       tables.infinite_lights.empty()
           ? 0
-          : static_cast<float>(share(infinite) / static_cast<double>(tables.infinite_lights.size()));
+          : static_cast<float>(share(infinite) /
+                               static_cast<double>(tables.infinite_lights.size()));
 }
 
 }  // namespace

@@ -35,8 +35,8 @@ int BucketOf(const LightCluster& light, const Extent& e, int axis) {
 }
 
 struct Split {
-  int axis = -1;    // -1: none found
-  int bucket = 0;   // the last one of the left side
+  int axis = -1;   // -1: none found
+  int bucket = 0;  // the last one of the left side
   double cost = std::numeric_limits<double>::infinity();
 };
 

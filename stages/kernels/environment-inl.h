@@ -1,9 +1,9 @@
 // The environment map: radiance along a direction, and directions drawn in proportion to it.
 //
-// The density of `SampleEnvironment` over the map is exactly the bilinear interpolation of the texels'
-// selection probabilities: a texel is chosen by inverting integer tables, then a place under its tent,
-// the triangle function that bilinear interpolation gives it. Lookup and density read the same four
-// texels with the same weights, so a direction with radiance has a density.
+// The density of `SampleEnvironment` over the map is exactly the bilinear interpolation of the
+// texels' selection probabilities: a texel is chosen by inverting integer tables, then a place
+// under its tent, the triangle function that bilinear interpolation gives it. Lookup and density
+// read the same four texels with the same weights, so a direction with radiance has a density.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -22,9 +22,9 @@ HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
 namespace lights {
 
-/// A place on the map: texel centres are at integers, the place at (i + fs, j + ft) with fs, ft in [0, 1],
-/// i in [0, width) and j in [-1, height). `sin_theta` belongs to the direction and is kept because it is
-/// more exact than what the place gives near the poles.
+/// A place on the map: texel centres are at integers, the place at (i + fs, j + ft) with fs, ft in
+/// [0, 1], i in [0, width) and j in [-1, height). `sin_theta` belongs to the direction and is kept
+/// because it is more exact than what the place gives near the poles.
 template <class D>
 struct EnvironmentPlace {
   Int<D> i, j;
@@ -97,16 +97,23 @@ HWY_INLINE EnvironmentTaps<D> TapsAt(D d, const EnvironmentView& view,
 
   const Real<D> fs = place.fs, ft = place.ft;
   const Real<D> gs = Splat(d, 1) - fs, gt = Splat(d, 1) - ft;
-  return {hn::ShiftLeft<2>(row0 + place.i),  hn::ShiftLeft<2>(row0 + i1),
-          hn::ShiftLeft<2>(row1 + place.i),  hn::ShiftLeft<2>(row1 + i1),
-          gs * gt, fs * gt, gs * ft, fs * ft};
+  return {hn::ShiftLeft<2>(row0 + place.i),
+          hn::ShiftLeft<2>(row0 + i1),
+          hn::ShiftLeft<2>(row1 + place.i),
+          hn::ShiftLeft<2>(row1 + i1),
+          gs * gt,
+          fs * gt,
+          gs * ft,
+          fs * ft};
 }
 
 /// The bilinear value of all four channels of the texels: radiance, and selection probability in w.
 template <class D>
 HWY_INLINE Quad<D> Interpolate(D d, const EnvironmentView& view, const EnvironmentTaps<D>& taps) {
-  const Quad<D> a = GatherQuad(d, view.texels, taps.at00), b = GatherQuad(d, view.texels, taps.at10),
-                c = GatherQuad(d, view.texels, taps.at01), e = GatherQuad(d, view.texels, taps.at11);
+  const Quad<D> a = GatherQuad(d, view.texels, taps.at00),
+                b = GatherQuad(d, view.texels, taps.at10),
+                c = GatherQuad(d, view.texels, taps.at01),
+                e = GatherQuad(d, view.texels, taps.at11);
   const auto blend = [&](Real<D> a, Real<D> b, Real<D> c, Real<D> e) HWY_ATTR {
     return hn::MulAdd(taps.w00, a, hn::MulAdd(taps.w10, b, hn::MulAdd(taps.w01, c, taps.w11 * e)));
   };
@@ -119,8 +126,8 @@ HWY_INLINE EnvironmentValue<D> ValueAt(D d, const EnvironmentView& view,
                                        const EnvironmentPlace<D>& place) {
   const Quad<D> value = Interpolate(d, view, TapsAt(d, view, place));
   const double texels = static_cast<double>(view.width) * view.height;
-  const Real<D> pdf = value.w * Splat(d, texels / (2 * kPi * kPi)) /
-                      hn::Max(place.sin_theta, Splat(d, 1e-7));
+  const Real<D> pdf =
+      value.w * Splat(d, texels / (2 * kPi * kPi)) / hn::Max(place.sin_theta, Splat(d, 1e-7));
   return {{value.x, value.y, value.z}, pdf};
 }
 
@@ -144,7 +151,8 @@ HWY_INLINE Real<D> EnvironmentPdf(D d, const EnvironmentView& view, const Vec3<D
   return LookUpEnvironment(d, view, dir).pdf;
 }
 
-/// An entry of an exclusive cumulative table, and where within the entry's mass the number fell: in (0, 1).
+/// An entry of an exclusive cumulative table, and where within the entry's mass the number fell: in
+/// (0, 1).
 template <class D>
 struct TableEntry {
   Int<D> index;
@@ -158,8 +166,8 @@ struct SelectionTables {
   int32_t count;
 };
 
-/// The last entry of table `which` whose cumulative mass is not above u's cell: entries without mass share
-/// their successor's (or the end's) and are never the last.
+/// The last entry of table `which` whose cumulative mass is not above u's cell: entries without
+/// mass share their successor's (or the end's) and are never the last.
 template <class D>
 HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> which, Real<D> u) {
   const IntTag<D> di;
@@ -196,8 +204,9 @@ HWY_INLINE Real<D> SampleTent(D d, Real<D> u) {
   return hn::IfThenElse(rising, root - one, one - root);
 }
 
-/// A place under the tent of `texel`: the texel before the place, and how far it is behind it. Kept apart,
-/// because their sum would round a place near the edge of the tent onto it, where the density is 0.
+/// A place under the tent of `texel`: the texel before the place, and how far it is behind it. Kept
+/// apart, because their sum would round a place near the edge of the tent onto it, where the
+/// density is 0.
 template <class D>
 HWY_INLINE Int<D> PlaceUnderTent(D d, const TableEntry<D>& texel, Real<D>& fraction) {
   const IntTag<D> di;
@@ -207,17 +216,19 @@ HWY_INLINE Int<D> PlaceUnderTent(D d, const TableEntry<D>& texel, Real<D>& fract
   return hn::IfThenElse(ToIntMask(d, before), texel.index - hn::Set(di, 1), texel.index);
 }
 
-/// Distance in rows to the nearer pole, from that side, so that its sine keeps its relative precision.
+/// Distance in rows to the nearer pole, from that side, so that its sine keeps its relative
+/// precision.
 template <class D>
-HWY_INLINE Real<D> RowsFromPole(D d, const EnvironmentView& view, const EnvironmentPlace<D>& place) {
+HWY_INLINE Real<D> RowsFromPole(D d, const EnvironmentView& view,
+                                const EnvironmentPlace<D>& place) {
   const Int<D> below = hn::Set(IntTag<D>(), view.height - 1) - place.j;
   const Real<D> north = hn::ConvertTo(d, place.j) + Splat(d, 0.5) + place.ft;
   const Real<D> south = hn::ConvertTo(d, below) + (Splat(d, 0.5) - place.ft);
   return hn::Max(hn::Min(north, south), hn::Zero(d));
 }
 
-/// A place with the density described above: tents are wrapped in s and reflected at the poles, which is
-/// what wrapping and clamping make of bilinear interpolation.
+/// A place with the density described above: tents are wrapped in s and reflected at the poles,
+/// which is what wrapping and clamping make of bilinear interpolation.
 template <class D>
 HWY_INLINE EnvironmentPlace<D> SamplePlace(D d, const EnvironmentView& view, const Vec2<D>& u) {
   const IntTag<D> di;
@@ -232,8 +243,8 @@ HWY_INLINE EnvironmentPlace<D> SamplePlace(D d, const EnvironmentView& view, con
   const Real<D> half = Splat(d, 0.5);
   const Mask<D> north = ToMask(d, hn::Lt(place.j, hn::Zero(di)));
   const Mask<D> south = ToMask(d, hn::Eq(place.j, hn::Set(di, view.height - 1)));
-  const Mask<D> beyond = hn::Or(hn::And(north, hn::Lt(place.ft, half)),
-                                hn::And(south, hn::Gt(place.ft, half)));
+  const Mask<D> beyond =
+      hn::Or(hn::And(north, hn::Lt(place.ft, half)), hn::And(south, hn::Gt(place.ft, half)));
   place.ft = hn::IfThenElse(beyond, Splat(d, 1) - place.ft, place.ft);
   place.sin_theta = hn::Sin(d, RowsFromPole(d, view, place) * Splat(d, kPi / view.height));
   return place;
@@ -264,8 +275,8 @@ HWY_INLINE EnvironmentSample<D> SampleEnvironment(D d, const EnvironmentView& vi
 
 }  // namespace lights
 
-using lights::EnvironmentRadiance;
 using lights::EnvironmentPdf;
+using lights::EnvironmentRadiance;
 using lights::EnvironmentSample;
 using lights::EnvironmentValue;
 using lights::LookUpEnvironment;

@@ -1,4 +1,5 @@
-// Small numerics that only lights need: atan2, angle differences from sines and cosines, safe square roots.
+// Small numerics that only lights need: atan2, angle differences from sines and cosines, safe
+// square roots.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -19,17 +20,17 @@ namespace lights {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kLargestBelowOne = 0.999999940395355224609375;  // 1 - 2^-24, in float
 
-/// Angle of the vector (x, y) in [-pi, pi]; (0, 0) gives 0. Error below 4e-7. Not named Atan2: newer
-/// Highways have one, which argument-dependent lookup would find too.
+/// Angle of the vector (x, y) in [-pi, pi]; (0, 0) gives 0. Error below 4e-7. Not named Atan2:
+/// newer Highways have one, which argument-dependent lookup would find too.
 template <class D>
 HWY_INLINE Real<D> AngleOf(D d, Real<D> y, Real<D> x) {
   const Real<D> ax = hn::Abs(x), ay = hn::Abs(y);
   const Real<D> ratio = SafeDiv(d, hn::Min(ax, ay), hn::Max(ax, ay));
   const Real<D> first_octant = hn::Atan(d, ratio);
-  const Real<D> first_quadrant = hn::IfThenElse(
-      hn::Gt(ay, ax), Splat(d, kPi / 2) - first_octant, first_octant);
-  const Real<D> half_plane = hn::IfThenElse(
-      hn::Lt(x, hn::Zero(d)), Splat(d, kPi) - first_quadrant, first_quadrant);
+  const Real<D> first_quadrant =
+      hn::IfThenElse(hn::Gt(ay, ax), Splat(d, kPi / 2) - first_octant, first_octant);
+  const Real<D> half_plane =
+      hn::IfThenElse(hn::Lt(x, hn::Zero(d)), Splat(d, kPi) - first_quadrant, first_quadrant);
   return hn::CopySign(half_plane, y);
 }
 

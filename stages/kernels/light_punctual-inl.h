@@ -27,7 +27,8 @@ struct PunctualSample {
   Vec3<D> irradiance;  // on a surface that faces wi; 0 out of range, outside the cone, on the light
 };
 
-/// KHR_lights_punctual, "Range Property": max(min(1 - (d / range)^4, 1), 0) / d^2; range 0 is infinite.
+/// KHR_lights_punctual, "Range Property": max(min(1 - (d / range)^4, 1), 0) / d^2; range 0 is
+/// infinite.
 template <class D>
 HWY_INLINE Real<D> DistanceFactor(D d, Real<D> distance, Real<D> range) {
   const Real<D> relative = SafeDiv(d, distance, range), squared = relative * relative;
@@ -36,7 +37,8 @@ HWY_INLINE Real<D> DistanceFactor(D d, Real<D> distance, Real<D> range) {
   return hn::IfThenElseZero(hn::Gt(distance2, Splat(d, 1e-30)), SafeDiv(d, window, distance2));
 }
 
-/// KHR_lights_punctual, "Inner and Outer Cone Angles". `cos` is between the spot's axis and the ray.
+/// KHR_lights_punctual, "Inner and Outer Cone Angles". `cos` is between the spot's axis and the
+/// ray.
 template <class D>
 HWY_INLINE Real<D> ConeFactor(D d, Real<D> cos, Real<D> cos_inner, Real<D> cos_outer) {
   const Real<D> width = hn::Max(cos_inner - cos_outer, Splat(d, 0.001));
@@ -56,17 +58,16 @@ HWY_INLINE PunctualSample<D> SamplePunctual(D d, const Light* lights, Int<D> lig
   };
   const Mask<D> directional = is(LightType::directional), spot = is(LightType::spot);
   const Vec3<D> axis = FieldVec3(d, lights, light, offsetof(Light, direction));
-  const Vec3<D> to_light =
-      Sub<D>(FieldVec3(d, lights, light, offsetof(Light, position)), ref);
+  const Vec3<D> to_light = Sub<D>(FieldVec3(d, lights, light, offsetof(Light, position)), ref);
   const Real<D> distance = SafeSqrt(d, Dot(to_light, to_light));
-  const Vec3<D> wi = Select<D>(directional, Neg<D>(axis),
-                               Scale(to_light, SafeDiv(d, Splat(d, 1), distance)));
+  const Vec3<D> wi =
+      Select<D>(directional, Neg<D>(axis), Scale(to_light, SafeDiv(d, Splat(d, 1), distance)));
 
   Real<D> factor = DistanceFactor(d, distance, FieldReal(d, lights, light, offsetof(Light, range)));
   if (!hn::AllFalse(d, spot)) {
-    const Real<D> cone =
-        ConeFactor(d, hn::Neg(Dot(axis, wi)), FieldReal(d, lights, light, offsetof(Light, cos_inner)),
-                   FieldReal(d, lights, light, offsetof(Light, cos_outer)));
+    const Real<D> cone = ConeFactor(d, hn::Neg(Dot(axis, wi)),
+                                    FieldReal(d, lights, light, offsetof(Light, cos_inner)),
+                                    FieldReal(d, lights, light, offsetof(Light, cos_outer)));
     factor = hn::IfThenElse(spot, factor * cone, factor);
   }
   factor = hn::IfThenElse(directional, Splat(d, 1), factor);

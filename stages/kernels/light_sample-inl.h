@@ -24,15 +24,15 @@ namespace lights {
 
 template <class D>
 struct LightSample {
-  Vec3<D> wi;             // unit, from the receiver
-  Real<D> distance;       // to the light; kFarAway where it is infinitely far
-  /// environment: radiance; punctual: irradiance on a surface facing `wi`; triangle: 1, to be multiplied
-  /// by the emission at (b1, b2).
+  Vec3<D> wi;        // unit, from the receiver
+  Real<D> distance;  // to the light; kFarAway where it is infinitely far
+  /// environment: radiance; punctual: irradiance on a surface facing `wi`; triangle: 1, to be
+  /// multiplied by the emission at (b1, b2).
   Vec3<D> radiance_or_irradiance;
-  Real<D> pdf;            // per solid angle (1 for delta lights) x selection; 0: no sample
-  Mask<D> delta;          // punctual: no other way of finding the light
-  Int<D> light;           // kNone: the environment, or no sample
-  Real<D> b1, b2;         // triangle: barycentrics of p1 and p2
+  Real<D> pdf;     // per solid angle (1 for delta lights) x selection; 0: no sample
+  Mask<D> delta;   // punctual: no other way of finding the light
+  Int<D> light;    // kNone: the environment, or no sample
+  Real<D> b1, b2;  // triangle: barycentrics of p1 and p2
 };
 
 /// The kind of light that each lane's number falls to, in the order tree, infinite, environment.
@@ -55,8 +55,7 @@ HWY_INLINE KindChoice<D> ChooseKind(D d, const LightView& view, Mask<D> active, 
   const Mask<D> second = hn::AndNot(below_tree, below_infinite);
 
   const Real<D> in_tree = SafeDiv(d, u, Splat(d, view.tree_probability));
-  const Real<D> in_infinite =
-      SafeDiv(d, u - Splat(d, view.tree_probability), Splat(d, infinite));
+  const Real<D> in_infinite = SafeDiv(d, u - Splat(d, view.tree_probability), Splat(d, infinite));
   return {hn::And(active, below_tree), hn::And(active, second),
           hn::AndNot(hn::Or(below_tree, below_infinite), active),
           hn::Min(hn::IfThenElse(second, in_infinite, in_tree), Splat(d, kLargestBelowOne))};
@@ -79,25 +78,25 @@ template <class D>
 HWY_INLINE LightSample<D> NoLight(D d) {
   const Real<D> zero = hn::Zero(d);
   const Mask<D> never = hn::Lt(zero, zero);
-  return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0),
-          zero,               never, hn::Set(IntTag<D>(), kNone), zero, zero};
+  const Int<D> none = hn::Set(IntTag<D>(), kNone);
+  return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0), zero, never, none, zero, zero};
 }
 
 /// `pdf` of the result has no selection in it. A light with one side gives nothing behind it.
 template <class D>
 HWY_INLINE LightSample<D> FromTriangle(D d, const LightView& view, Mask<D> active, Int<D> light,
                                        const Vec3<D>& ref, const Vec2<D>& u) {
-  const auto lit = ToIntMask(d, active);
-  const auto field = [&](size_t offset) HWY_ATTR {
-    return hn::IfThenElseZero(lit, FieldInt(d, view.lights, light, offset));
-  };
-  const Triangle<D> triangle = TriangleVertices(
-      d, view.geometry, field(offsetof(Light, placement)), field(offsetof(Light, primitive)));
+  // Idle lanes take the first light: where there are triangle lights, it is one.
+  const Int<D> valid = hn::IfThenElseZero(ToIntMask(d, active), light);
+  const auto field = [&](size_t offset)
+                         HWY_ATTR { return FieldInt(d, view.lights, valid, offset); };
+  const Triangle<D> triangle = TriangleVertices(d, view.geometry, field(offsetof(Light, placement)),
+                                                field(offsetof(Light, primitive)));
   const TriangleLightSample<D> s =
       SampleTriangleLight(d, triangle.p0, triangle.p1, triangle.p2, ref, u);
-  const auto one_sided = ToMask(d, hn::Eq(
-      field(offsetof(Light, type)),
-      hn::Set(IntTag<D>(), static_cast<int32_t>(LightType::triangle))));
+  const auto one_sided =
+      ToMask(d, hn::Eq(field(offsetof(Light, type)),
+                       hn::Set(IntTag<D>(), static_cast<int32_t>(LightType::triangle))));
   const Mask<D> behind =
       hn::Ge(Dot(TriangleAreaNormal<D>(triangle), Sub<D>(triangle.p0, ref)), hn::Zero(d));
   LightSample<D> sample = NoLight(d);
@@ -140,9 +139,8 @@ HWY_INLINE LightSample<D> FromEnvironment(D d, const LightView& view, const Vec2
 
 /// The light each lane shall sample, from the tree or from the infinite ones.
 template <class D>
-HWY_INLINE LightPick<D> PickFiniteOrInfinite(D d, const LightView& view,
-                                             const KindChoice<D>& kind, const Vec3<D>& position,
-                                             const Vec3<D>& normal) {
+HWY_INLINE LightPick<D> PickFiniteOrInfinite(D d, const LightView& view, const KindChoice<D>& kind,
+                                             const Vec3<D>& position, const Vec3<D>& normal) {
   LightPick<D> pick = {hn::Set(IntTag<D>(), kNone), hn::Zero(d), kind.u_remapped};
   if (!hn::AllFalse(d, kind.tree)) {
     pick = PickLight(d, view, kind.tree, position, normal, kind.u_remapped);
@@ -162,8 +160,8 @@ HWY_INLINE LightPick<D> PickFiniteOrInfinite(D d, const LightView& view,
   return pick;
 }
 
-/// One sample of all light that may reach each active receiver. `normal` is unit length on the side that
-/// takes light, or zero for a receiver that takes it from all sides.
+/// One sample of all light that may reach each active receiver. `normal` is unit length on the side
+/// that takes light, or zero for a receiver that takes it from all sides.
 template <class D>
 HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active,
                                       const Vec3<D>& position, const Vec3<D>& normal,
@@ -184,8 +182,8 @@ HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active
 
   const Int<D> light = hn::IfThenElseZero(ToIntMask(d, has_light), pick.light);
   const Int<D> type = FieldInt(d, view.lights, light, offsetof(Light, type));
-  const Mask<D> triangle = hn::And(
-      has_light, ToMask(d, hn::Lt(type, hn::Set(di, kLastTriangleType + 1))));
+  const Mask<D> triangle =
+      hn::And(has_light, ToMask(d, hn::Lt(type, hn::Set(di, kLastTriangleType + 1))));
   const Mask<D> punctual = hn::AndNot(triangle, has_light);
   if (!hn::AllFalse(d, triangle)) {
     sample = Merge(d, triangle, sample, FromTriangle(d, view, triangle, light, position, u));
@@ -197,8 +195,8 @@ HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active
   return sample;
 }
 
-/// Density with which `SampleLight` at `position` returns the point of the triangle light `light` that
-/// lies at `distance` along the unit `wi`; all else as it was given there.
+/// Density with which `SampleLight` at `position` returns the point of the triangle light `light`
+/// that lies at `distance` along the unit `wi`; all else as it was given there.
 template <class D>
 HWY_INLINE Real<D> LightPdfForTriangleHit(D d, const LightView& view, Mask<D> active,
                                           const Vec3<D>& position, const Vec3<D>& normal,

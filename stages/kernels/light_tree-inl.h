@@ -1,8 +1,8 @@
 // Picks one light of many by descending the light tree, and tells with what probability it would.
 //
-// Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting": at each
-// node the two children compete by a bound of what they may contribute to the receiver, and one number
-// in [0, 1) decides, remapped on the way.
+// Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting": at
+// each node the two children compete by a bound of what they may contribute to the receiver, and
+// one number in [0, 1) decides, remapped on the way.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -26,9 +26,9 @@ namespace lights {
 /// A light of the tree, and the probability of having picked it from the tree.
 template <class D>
 struct LightPick {
-  Int<D> light;          // kNone: no light of the tree can reach the receiver
-  Real<D> probability;   // 0 with kNone
-  Real<D> u_remapped;    // in [0, 1), uniform again given the light
+  Int<D> light;         // kNone: no light of the tree can reach the receiver
+  Real<D> probability;  // 0 with kNone
+  Real<D> u_remapped;   // in [0, 1), uniform again given the light
 };
 
 /// Where light is to arrive. A zero normal means a receiver that takes light from all sides alike.
@@ -42,8 +42,8 @@ HWY_INLINE Receiver<D> MakeReceiver(D d, const Vec3<D>& position, const Vec3<D>&
   return {position, normal, hn::Not(hn::Gt(Dot(normal, normal), hn::Zero(d)))};
 }
 
-// Bounds come from rounded numbers, so nothing is culled by less than this difference of cosines, and
-// what is not culled keeps at least this share of its unoccluded, perpendicular importance.
+// Bounds come from rounded numbers, so nothing is culled by less than this difference of cosines,
+// and what is not culled keeps at least this share of its unoccluded, perpendicular importance.
 constexpr double kCullMargin = 1e-3;
 constexpr double kLeastEmission = 1e-3;
 // Receivers below the horizon of a shading normal may still take light (transmission, bump maps).
@@ -67,12 +67,21 @@ HWY_INLINE NodeLanes<D> LoadNode(D d, const LightNode* nodes, Int<D> node) {
   const Quad<D> sphere = FieldQuad(d, nodes, node, offsetof(LightNode, center));
   const Quad<D> emission = FieldQuad(d, nodes, node, offsetof(LightNode, axis));
   const Quad<D> rest = FieldQuad(d, nodes, node, offsetof(LightNode, cos_theta_o));
-  return {{sphere.x, sphere.y, sphere.z}, {emission.x, emission.y, emission.z},
-          sphere.w, emission.w, rest.x, rest.y, hn::BitCast(di, rest.z), hn::BitCast(di, rest.w)};
+  NodeLanes<D> lanes;
+  lanes.center = {sphere.x, sphere.y, sphere.z};
+  lanes.radius = sphere.w;
+  lanes.axis = {emission.x, emission.y, emission.z};
+  lanes.signed_power = emission.w;
+  lanes.cos_o = rest.x;
+  lanes.cos_e = rest.y;
+  lanes.child_or_light = hn::BitCast(di, rest.z);
+  lanes.parent = hn::BitCast(di, rest.w);
+  return lanes;
 }
 
-/// Cosine bound of the emitters' normals: 0 where nothing of the cluster can shine towards the receiver.
-/// `cos_w` is between the axis and the direction from the cluster's centre to the receiver.
+/// Cosine bound of the emitters' normals: 0 where nothing of the cluster can shine towards the
+/// receiver. `cos_w` is between the axis and the direction from the cluster's centre to the
+/// receiver.
 template <class D>
 HWY_INLINE Real<D> EmissionBound(D d, const NodeLanes<D>& node, Real<D> cos_w,
                                  const Angle<D>& subtended) {
@@ -104,23 +113,22 @@ HWY_INLINE Real<D> Importance(D d, const NodeLanes<D>& node, const Receiver<D>& 
   const Real<D> inverse = hn::Sqrt(inverse_square);
   // Inside the sphere the cluster may lie in any direction: an angle of pi takes every bound to 1.
   const Real<D> sin_b = hn::IfThenElseZero(outside, node.radius * inverse);
-  const Real<D> cos_b = hn::IfThenElse(
-      outside, SafeSqrt(d, hn::NegMulAdd(sin_b, sin_b, one)), Splat(d, -1));
+  const Real<D> cos_b =
+      hn::IfThenElse(outside, SafeSqrt(d, hn::NegMulAdd(sin_b, sin_b, one)), Splat(d, -1));
   const Angle<D> subtended = {cos_b, sin_b};
 
   const Real<D> cos_w = hn::IfThenElse(outside, Dot(node.axis, away) * inverse, one);
-  const Real<D> cos_i =
-      hn::IfThenElse(outside, hn::Neg(Dot(receiver.normal, away)) * inverse, one);
+  const Real<D> cos_i = hn::IfThenElse(outside, hn::Neg(Dot(receiver.normal, away)) * inverse, one);
   const Real<D> emission = EmissionBound(d, node, cos_w, subtended);
   const Real<D> reception = ReceptionBound(d, receiver, cos_i, subtended);
-  const Real<D> importance =
-      hn::Abs(node.signed_power) * (emission * reception) * inverse_square;
+  const Real<D> importance = hn::Abs(node.signed_power) * (emission * reception) * inverse_square;
   return hn::IfThenElseZero(hn::Gt(emission, hn::Zero(d)),
                             hn::Max(importance, Splat(d, kLeastImportance)));
 }
 
-/// Probability of the left child of a pair with these importances, of which one is > 0. Bounds can be
-/// wrong by any factor (a bright light behind a wall), so neither child that may contribute is starved.
+/// Probability of the left child of a pair with these importances, of which one is > 0. Bounds can
+/// be wrong by any factor (a bright light behind a wall), so neither child that may contribute is
+/// starved.
 template <class D>
 HWY_INLINE Real<D> LeftProbability(D d, Real<D> left, Real<D> right) {
   const Real<D> zero = hn::Zero(d), one = Splat(d, 1), least = Splat(d, kLeastShare);
@@ -128,8 +136,8 @@ HWY_INLINE Real<D> LeftProbability(D d, Real<D> left, Real<D> right) {
   return hn::IfThenElseZero(hn::Gt(left, zero), hn::IfThenElse(hn::Gt(right, zero), shared, one));
 }
 
-/// A stream of numbers in [0, 1) that refills the bits which remapping uses up: a descent through many
-/// rare branches would otherwise decide on zeros. Mixing function: C. Wellons' "lowbias32".
+/// A stream of numbers in [0, 1) that refills the bits which remapping uses up: a descent through
+/// many rare branches would otherwise decide on zeros. Mixing function: C. Wellons' "lowbias32".
 template <class D>
 struct Refill {
   Uint<D> state;
@@ -201,8 +209,7 @@ HWY_INLINE LightPick<D> PickLight(D d, const LightView& view, Mask<D> active,
 /// Probability with which `PickLight` returns `light` (kNone allowed: 0), climbing from its leaf.
 template <class D>
 HWY_INLINE Real<D> PickProbability(D d, const LightView& view, Mask<D> active,
-                                   const Vec3<D>& position, const Vec3<D>& normal,
-                                   Int<D> light) {
+                                   const Vec3<D>& position, const Vec3<D>& normal, Int<D> light) {
   const IntTag<D> di;
   const Int<D> zero = hn::Zero(di), one = hn::Set(di, 1);
   if (view.node_count == 0) return hn::Zero(d);

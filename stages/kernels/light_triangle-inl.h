@@ -1,15 +1,18 @@
 // Samples a point of a triangle light as seen from a receiver, with densities per solid angle.
 //
-// Three methods, chosen by the solid angle of the triangle:
-//   below kLeastSolidAngle: uniform over the area. Seen from afar its density is all but constant, and it
-//     needs no difference of nearly equal directions: a spherical triangle of edge e places its points
-//     with a relative error of about 2^-24 / e, 1e-5 at the switch.
-//   above kGreatestSolidAngle: uniform over the hemisphere about the triangle's normal; a direction that
-//     passes the triangle gives no sample. The receiver is so close that few do, while the arcs of the
-//     spherical triangle are nearly half circles, whose planes rounding turns about.
-//   between: uniform over the spherical triangle (Arvo 1995, "Stratified Sampling of Spherical
-//     Triangles"), in the form of Peters 2021, "BRDF Importance Sampling for Polygonal Lights": half
-//     angles and no angle sums, hence without the cancellation of alpha + beta + gamma - pi.
+// Three methods, chosen by the solid angle of the triangle.
+//
+// Below kLeastSolidAngle: uniform over the area. Seen from afar its density is all but constant,
+// and it needs no difference of nearly equal directions: a spherical triangle of edge e places its
+// points with a relative error of about 2^-24 / e, 1e-5 at the switch.
+//
+// Above kGreatestSolidAngle: uniform over the hemisphere about the triangle's normal; a direction
+// that passes the triangle gives no sample. The receiver is so close that few do, while the arcs of
+// the spherical triangle are nearly half circles, whose planes rounding turns about.
+//
+// Between: uniform over the spherical triangle (Arvo 1995, "Stratified Sampling of Spherical
+// Triangles"), in the form of Peters 2021, "BRDF Importance Sampling for Polygonal Lights": half
+// angles and no angle sums, hence without the cancellation of alpha + beta + gamma - pi.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -31,23 +34,23 @@ constexpr double kGreatestSolidAngle = 6.2;
 
 template <class D>
 struct TriangleLightSample {
-  Real<D> b1, b2;    // barycentrics of p1 and p2
-  Vec3<D> wi;        // unit, from the receiver
+  Real<D> b1, b2;  // barycentrics of p1 and p2
+  Vec3<D> wi;      // unit, from the receiver
   Real<D> distance;
-  Real<D> pdf;       // per solid angle; 0: no sample
+  Real<D> pdf;  // per solid angle; 0: no sample
 };
 
 /// The triangle as the receiver sees it.
 template <class D>
 struct SphericalTriangle {
-  Vec3<D> p0, p1, p2;        // vertices relative to the receiver
-  Vec3<D> area_normal;       // twice the area, along the normal of the vertex order
-  Real<D> triple;            // p0 . (p1 x p2) = area_normal . p0: < 0 in front of the triangle
-  Vec3<D> a, b, c;           // unit directions to the vertices; a to c is the longest arc
+  Vec3<D> p0, p1, p2;   // vertices relative to the receiver
+  Vec3<D> area_normal;  // twice the area, along the normal of the vertex order
+  Real<D> triple;       // p0 . (p1 x p2) = area_normal . p0: < 0 in front of the triangle
+  Vec3<D> a, b, c;      // unit directions to the vertices; a to c is the longest arc
   Real<D> one_plus_ab, ac, bc;
-  Real<D> volume;            // |a . (b x c)|
+  Real<D> volume;  // |a . (b x c)|
   Real<D> solid_angle;
-  Mask<D> tiny, huge;        // which method samples it
+  Mask<D> tiny, huge;  // which method samples it
 };
 
 /// Rotates the vertices so that the longest arc, whose ends have the least cosine, is opposite `b`.
@@ -107,8 +110,8 @@ HWY_INLINE Vec3<D> SampleSphericalTriangle(D d, const SphericalTriangle<D>& t, c
   const Real<D> half = Splat(d, 0.5) * u.x * t.solid_angle;
   const Real<D> sin = hn::Sin(d, half), cos = hn::Cos(d, half);
   // h halves the arc from a to c' (Peters 2021, section 3.2).
-  const Vec3<D> h = MulAdd(t.a, hn::NegMulAdd(t.ac + t.bc, sin, t.volume * cos),
-                           Scale(t.c, t.one_plus_ab * sin));
+  const Vec3<D> h =
+      MulAdd(t.a, hn::NegMulAdd(t.ac + t.bc, sin, t.volume * cos), Scale(t.c, t.one_plus_ab * sin));
   const Real<D> reflect = SafeDiv(d, Splat(d, 2) * Dot(t.a, h), Dot(h, h));
   const Vec3<D> c = SafeNormalize(d, Sub<D>(Scale(h, reflect), t.a), t.c);
 
@@ -154,13 +157,14 @@ HWY_INLINE Barycentrics<D> SampleByArea(D d, const Vec2<D>& u) {
           hn::IfThenElse(lower, hn::NegMulAdd(half, u.x, u.y), u.y * half)};
 }
 
-/// Uniform over the hemisphere in which the triangle lies; may miss it (b1, b2 or their rest is < 0).
+/// Uniform over the hemisphere in which the triangle lies; may miss it (b1, b2 or their rest is <
+/// 0).
 template <class D>
 HWY_INLINE Barycentrics<D> SampleByHemisphere(D d, const SphericalTriangle<D>& t,
                                               const Vec2<D>& u) {
   const Vec3<D> normal = SafeNormalize(d, t.area_normal, Splat3(d, 0, 0, 1));
-  const Frame<D> frame = MakeFrame(
-      d, Select<D>(hn::Lt(t.triple, hn::Zero(d)), Neg<D>(normal), normal));
+  const Frame<D> frame =
+      MakeFrame(d, Select<D>(hn::Lt(t.triple, hn::Zero(d)), Neg<D>(normal), normal));
   const Real<D> z = u.x, r = SafeSqrt(d, hn::NegMulAdd(z, z, Splat(d, 1)));
   const Real<D> phi = Splat(d, 2 * kPi) * (u.y - Splat(d, 0.5));
   return MeetPlane(d, t, ToWorld(frame, Vec3<D>{r * hn::Cos(d, phi), r * hn::Sin(d, phi), z}));
@@ -168,17 +172,17 @@ HWY_INLINE Barycentrics<D> SampleByHemisphere(D d, const SphericalTriangle<D>& t
 
 /// Density per solid angle of choosing the point at `distance` along the unit `wi`.
 template <class D>
-HWY_INLINE Real<D> PdfOf(D d, const SphericalTriangle<D>& t, const Vec3<D>& wi,
-                         Real<D> distance) {
-  const Real<D> even = SafeDiv(
-      d, Splat(d, 1), hn::IfThenElse(t.huge, Splat(d, 2 * kPi), t.solid_angle));
+HWY_INLINE Real<D> PdfOf(D d, const SphericalTriangle<D>& t, const Vec3<D>& wi, Real<D> distance) {
+  const Real<D> even =
+      SafeDiv(d, Splat(d, 1), hn::IfThenElse(t.huge, Splat(d, 2 * kPi), t.solid_angle));
   const Real<D> by_area =
       SafeDiv(d, Splat(d, 2) * distance * distance, hn::Abs(Dot(t.area_normal, wi)));
   return hn::IfThenElseZero(hn::Gt(t.solid_angle, hn::Zero(d)),
                             hn::IfThenElse(t.tiny, by_area, even));
 }
 
-/// A point of the triangle as seen from `ref`. From within the triangle's plane there is none (pdf 0).
+/// A point of the triangle as seen from `ref`. From within the triangle's plane there is none (pdf
+/// 0).
 template <class D>
 HWY_INLINE TriangleLightSample<D> SampleTriangleLight(D d, const Vec3<D>& p0, const Vec3<D>& p1,
                                                       const Vec3<D>& p2, const Vec3<D>& ref,

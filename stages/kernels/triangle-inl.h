@@ -32,12 +32,11 @@ struct TriangleIndices {
 };
 
 template <class D>
-HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& view,
-                                                    Int<D> placement, Int<D> primitive) {
+HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& view, Int<D> placement,
+                                                    Int<D> primitive) {
   const IntTag<D> di;
-  const Int<D> first =
-      FieldInt(d, view.placements, placement, offsetof(Placement, first_index)) +
-      primitive * hn::Set(di, 3);
+  const Int<D> first = FieldInt(d, view.placements, placement, offsetof(Placement, first_index)) +
+                       primitive * hn::Set(di, 3);
   return {GatherInt(d, view.indices, first), GatherInt(d, view.indices, first + hn::Set(di, 1)),
           GatherInt(d, view.indices, first + hn::Set(di, 2))};
 }
@@ -56,8 +55,7 @@ HWY_INLINE Affine<D> ObjectToWorld(D d, const GeometryView& view, Int<D> placeme
 }
 template <class D>
 HWY_INLINE Vec3<D> TransformPoint(const Affine<D>& m, const Vec3<D>& p) {
-  const auto row = [&](const Quad<D>& r)
-                       HWY_ATTR { return Dot(Vec3<D>{r.x, r.y, r.z}, p) + r.w; };
+  const auto row = [&](const Quad<D>& r) HWY_ATTR { return Dot(Vec3<D>{r.x, r.y, r.z}, p) + r.w; };
   return {row(m.rows[0]), row(m.rows[1]), row(m.rows[2])};
 }
 

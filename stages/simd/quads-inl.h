@@ -1,7 +1,9 @@
-// Fetches four neighbouring words of one record per lane, by loading records and transposing registers.
+// Fetches four neighbouring words of one record per lane, by loading records and transposing
+// registers.
 //
-// A gather of N lanes reads N words by N addresses; four of them read the same cache lines four times. From
-// four lanes up, loading each record's 16 bytes and transposing blocks of 4x4 costs about a third (Zen 4).
+// A gather of N lanes reads N words by N addresses; four of them read the same cache lines four
+// times. From four lanes up, loading each record's 16 bytes and transposing blocks of 4x4 costs
+// about a third (Zen 4).
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -23,7 +25,8 @@ struct Quad {
   Real<D> x, y, z, w;
 };
 
-/// One 16-byte block per record `base[index[4 k]]`, k = 0, 1, ...: as many as the vector has blocks.
+/// One 16-byte block per record `base[index[4 k]]`, k = 0, 1, ...: as many as the vector has
+/// blocks.
 template <class D>
 HWY_INLINE Real<D> LoadBlocks(D d, const float* HWY_RESTRICT base, const int32_t* index) {
   if constexpr (hn::MaxLanes(D()) == 4) {
@@ -35,13 +38,14 @@ HWY_INLINE Real<D> LoadBlocks(D d, const float* HWY_RESTRICT base, const int32_t
   }
 }
 
-/// base[index], base[index + 1], ... base[index + 3]; `index` counts floats. All four must be readable in
-/// every lane.
+/// base[index], base[index + 1], ... base[index + 3]; `index` counts floats. All four must be
+/// readable in every lane.
 template <class D>
 HWY_INLINE Quad<D> GatherQuad(D d, const float* HWY_RESTRICT base, Int<D> index) {
   const IntTag<D> di;
   if constexpr (hn::MaxLanes(D()) < 4) {
-    const auto word = [&](int32_t k) HWY_ATTR { return GatherReal(d, base, index + hn::Set(di, k)); };
+    const auto word = [&](int32_t k)
+                          HWY_ATTR { return GatherReal(d, base, index + hn::Set(di, k)); };
     return {word(0), word(1), word(2), word(3)};
   } else {
     HWY_ALIGN int32_t at[hn::MaxLanes(D())];

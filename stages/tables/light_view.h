@@ -18,9 +18,12 @@ struct EnvironmentView {
 };
 
 inline EnvironmentView ViewOf(const Environment& environment) {
-  return {environment.width,          environment.height,
-          environment.texels.data(),  environment.row_cdf.data(),
-          environment.column_cdf.data(), environment.row_guide.data(),
+  return {environment.width,
+          environment.height,
+          environment.texels.data(),
+          environment.row_cdf.data(),
+          environment.column_cdf.data(),
+          environment.row_guide.data(),
           environment.column_guide.data()};
 }
 
@@ -31,11 +34,11 @@ struct LightView {
   const int32_t* infinite_lights = nullptr;
   int32_t node_count = 0;
   int32_t infinite_count = 0;
-  float tree_probability = 0;         // see LightTables
+  float tree_probability = 0;  // see LightTables
   float infinite_probability = 0;
   float environment_probability = 0;
   EnvironmentView environment;
-  GeometryView geometry;              // where triangle lights find their vertices
+  GeometryView geometry;  // where triangle lights find their vertices
 };
 
 inline LightView LightViewOf(const SceneTables& scene) {

@@ -8,7 +8,7 @@
 namespace carpool::stages {
 
 enum class LightType : int32_t {
-  triangle = 0,            // emits on the side of its geometric normal
+  triangle = 0,  // emits on the side of its geometric normal
   two_sided_triangle = 1,
   point = 2,
   spot = 3,
@@ -19,64 +19,68 @@ constexpr int32_t kLastTriangleType = 1;  // types up to here are triangles
 /// One light: 16 words. Positions and directions are world space relative to `SceneTables::origin`.
 struct alignas(64) Light {
   LightType type = LightType::triangle;
-  int32_t placement = 0;         // triangle: which placement ...
-  int32_t primitive = 0;         // ... and which of its triangles
-  int32_t leaf = -1;             // its leaf's index in the light tree; -1: not in the tree (directional)
-  float position[3] = {0, 0, 0}; // point, spot
-  float range = 0;               // point, spot: KHR_lights_punctual range; 0: infinite
+  int32_t placement = 0;  // triangle: which placement ...
+  int32_t primitive = 0;  // ... and which of its triangles
+  int32_t leaf = -1;      // its leaf's index in the light tree; -1: not in the tree (directional)
+  float position[3] = {0, 0, 0};    // point, spot
+  float range = 0;                  // point, spot: KHR_lights_punctual range; 0: infinite
   float direction[3] = {0, 0, -1};  // spot, directional: the way the light shines, unit length
-  float cos_inner = 1;           // spot: cosines of the cone angles
-  float intensity[3] = {0, 0, 0};  // point, spot: candela x colour; directional: lux x colour
+  float cos_inner = 1;              // spot: cosines of the cone angles
+  float intensity[3] = {0, 0, 0};   // point, spot: candela x colour; directional: lux x colour
   float cos_outer = 0;
 };
 static_assert(sizeof(Light) == 64);
 
-/// A node of the light tree: a cluster of lights. 16 words. The root is node 0; node 1 is unused, so that
-/// siblings are a pair (2k, 2k + 1) and each finds the other by flipping the lowest bit.
+/// A node of the light tree: a cluster of lights. 16 words. The root is node 0; node 1 is unused,
+/// so that siblings are a pair (2k, 2k + 1) and each finds the other by flipping the lowest bit.
 struct alignas(64) LightNode {
   float center[3] = {0, 0, 0};  // sphere around everything that emits
   float radius = 0;
-  float axis[3] = {0, 0, 1};    // cone of emission normals (Conty Estevez & Kulla 2018)
-  float signed_power = 0;       // candela of luminance, summed, as a share of the whole tree's;
-                                // negative: the cone's opposite counts as well (two-sided emitters)
-  float cos_theta_o = 1;        // bound on the angle between an emitter's normal and the axis
-  float cos_theta_e = 0;        // bound on the emission angle about a normal
-  int32_t child_or_light = -1;  // inner: index of the left child, the right one follows; leaf: ~light
+  float axis[3] = {0, 0, 1};  // cone of emission normals (Conty Estevez & Kulla 2018)
+  float signed_power = 0;     // candela of luminance, summed, as a share of the whole tree's;
+                              // negative: the cone's opposite counts as well (two-sided emitters)
+  float cos_theta_o = 1;      // bound on the angle between an emitter's normal and the axis
+  float cos_theta_e = 0;      // bound on the emission angle about a normal
+  int32_t child_or_light = -1;  // inner: the left child, the right one follows it; leaf: ~light
   int32_t parent = -1;          // -1 at the root
   int32_t pad[4] = {};
 };
 static_assert(sizeof(LightNode) == 64);
 
-/// Selection masses of an environment table are integers whose sum is this: the grid of a 24-bit float in
-/// [0, 1), so that a table is inverted without any rounding.
+/// Selection masses of an environment table are integers whose sum is this: the grid of a 24-bit
+/// float in [0, 1), so that a table is inverted without any rounding.
 constexpr int32_t kEnvironmentMass = 1 << 24;
 
-/// Inverting a table starts from its guide (Chen & Asau 1974, "On Generating Random Variates from an
-/// Empirical Distribution"): numbers are divided into 2^bits equal cells, and entry k of the guide is
-/// where a search for the first number of cell k ends; one more entry is for the last number of all.
+/// Inverting a table starts from its guide (Chen & Asau 1974, "On Generating Random Variates from
+/// an Empirical Distribution"): numbers are divided into 2^bits equal cells, and entry k of the
+/// guide is where a search for the first number of cell k ends; one more entry is for the last
+/// number of all.
 constexpr int32_t GuideBits(int32_t count) {
   const int32_t width = std::bit_width(static_cast<uint32_t>(count));
   return width > 3 ? width - 3 : 0;
 }
-constexpr int32_t GuideSize(int32_t count) { return (1 << GuideBits(count)) + 1; }
+constexpr int32_t GuideSize(int32_t count) {
+  return (1 << GuideBits(count)) + 1;
+}
 
-/// Lat-long environment map. Radiance is bilinear between texel centres, wrapping in u, clamped in v;
-/// direction (x, y, z) is at u = 1/2 + atan2(x, -z) / 2 pi, v = acos(y) / pi (glTF's -Z is the middle).
+/// Lat-long environment map. Radiance is bilinear between texel centres, wrapping in u, clamped in
+/// v; direction (x, y, z) is at u = 1/2 + atan2(x, -z) / 2 pi, v = acos(y) / pi (glTF's -Z is the
+/// middle).
 struct Environment {
   int32_t width = 0;  // 0: no environment
   int32_t height = 0;
-  /// 4 floats a texel: RGB in cd/m2, finite and >= 0, then P(row) P(column | row), the probability that
-  /// sampling selects this texel: > 0 wherever RGB is. At most 2^29 texels.
+  /// 4 floats a texel: RGB in cd/m2, finite and >= 0, then P(row) P(column | row), the probability
+  /// that sampling selects this texel: > 0 wherever RGB is. At most 2^29 texels.
   std::vector<float> texels;
-  std::vector<int32_t> row_cdf;     // height entries: exclusive cumulative mass of rows
-  std::vector<int32_t> column_cdf;  // width * height: exclusive cumulative mass within each row
+  std::vector<int32_t> row_cdf;       // height entries: exclusive cumulative mass of rows
+  std::vector<int32_t> column_cdf;    // width * height: exclusive cumulative mass within each row
   std::vector<int32_t> row_guide;     // GuideSize(height) entries
   std::vector<int32_t> column_guide;  // height * GuideSize(width)
 };
 
 struct LightTables {
-  std::vector<Light> lights;             // triangle lights first, in placement order; then punctual ones
-  std::vector<LightNode> nodes;          // depth-first; empty: no light in the tree
+  std::vector<Light> lights;     // triangle lights first, in placement order; then punctual ones
+  std::vector<LightNode> nodes;  // depth-first; empty: no light in the tree
   std::vector<int32_t> infinite_lights;  // indices of directional lights
   Environment environment;
   float tree_probability = 0;         // of choosing the tree, each infinite light, the environment:

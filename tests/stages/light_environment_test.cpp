@@ -1,4 +1,5 @@
-// The environment kernels: what they look up, where they sample, and that the two agree (HARD_CASES 30, 31).
+// The environment kernels: what they look up, where they sample, and that the two agree (HARD_CASES
+// 30, 31).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -61,7 +62,8 @@ Map Random(int width, int height, uint32_t seed, double share_of_black) {
   std::uniform_real_distribution<float> uniform(0, 1);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      if (uniform(rng) >= share_of_black) map.Set(x, y, uniform(rng), uniform(rng), 9 * uniform(rng));
+      if (uniform(rng) >= share_of_black)
+        map.Set(x, y, uniform(rng), uniform(rng), 9 * uniform(rng));
     }
   }
   return map;
@@ -83,8 +85,12 @@ std::array<double, 3> DirectionOf(double u, double v) {
   const double phi = 2 * kPi * (u - 0.5), theta = kPi * v;
   return {std::sin(theta) * std::sin(phi), std::cos(theta), -std::sin(theta) * std::cos(phi)};
 }
-double UOf(const float dir[3]) { return 0.5 + std::atan2(dir[0], -dir[2]) / (2 * kPi); }
-double VOf(const float dir[3]) { return std::atan2(std::hypot(dir[0], dir[2]), dir[1]) / kPi; }
+double UOf(const float dir[3]) {
+  return 0.5 + std::atan2(dir[0], -dir[2]) / (2 * kPi);
+}
+double VOf(const float dir[3]) {
+  return std::atan2(std::hypot(dir[0], dir[2]), dir[1]) / kPi;
+}
 
 LightQuery Towards(double u, double v) {
   LightQuery q;
@@ -102,7 +108,8 @@ std::vector<LightQuery> RandomNumbers(size_t count, uint32_t seed) {
   return queries;
 }
 
-/// Integral over the sphere of f(u, v), by the midpoint rule on a grid that divides every texel alike.
+/// Integral over the sphere of f(u, v), by the midpoint rule on a grid that divides every texel
+/// alike.
 template <class F>
 double OverSphere(const Map& map, const F& f) {
   const int nu = map.width * std::max(2, 256 / map.width);
@@ -226,8 +233,8 @@ TEST(LightEnvironment, SamplesFollowTheDensity) {
       const auto results =
           runner.run(LightKernel::sample_environment, built.view, RandomNumbers(kSamples, 7));
       for (const LightResult& r : results) {
-        // Rounding may carry a sample over the edge of a bin, so bins at the border of black are tested
-        // by SamplesHaveLight instead.
+        // Rounding may carry a sample over the edge of a bin, so bins at the border of black are
+        // tested by SamplesHaveLight instead.
         const int i = std::clamp(static_cast<int>(UOf(r.wi) * kBinsU), 0, kBinsU - 1);
         const int j = std::clamp(static_cast<int>(VOf(r.wi) * kBinsV), 0, kBinsV - 1);
         counts[j * kBinsU + i] += expected[j * kBinsU + i] > 0;
@@ -257,8 +264,8 @@ TEST(LightEnvironment, IrradianceEqualsTheTexelSum) {
         for (const LightResult& r : results) {
           estimate.Add(r.radiance[c] * cosine(r.wi[0], r.wi[1], r.wi[2]) / r.pdf);
         }
-        const double all = OverSphere(
-            map, [&](double u, double v) { return map.Channel(u, v, c); });
+        const double all =
+            OverSphere(map, [&](double u, double v) { return map.Channel(u, v, c); });
         if (truth <= 1e-6 * all) {  // at most the corner of a tent: too rare for a z-test
           EXPECT_LE(estimate.mean(), 1e-4 * all);
           continue;
@@ -286,7 +293,8 @@ TEST(LightEnvironment, SamplesHaveLight) {
       for (const LightResult& r :
            runner.run(LightKernel::sample_environment, built.view, queries)) {
         ASSERT_TRUE(std::isfinite(r.pdf) && r.pdf > 0)
-            << runner.name << " gives " << r.pdf << " towards " << r.wi[0] << ' ' << r.wi[1] << ' ' << r.wi[2];
+            << runner.name << " gives " << r.pdf << " towards " << r.wi[0] << ' ' << r.wi[1] << ' '
+            << r.wi[2];
         ASSERT_GT(r.radiance[0] + r.radiance[1] + r.radiance[2], 0) << runner.name;
         ASSERT_NEAR(std::hypot(r.wi[0], r.wi[1], r.wi[2]), 1, 1e-6) << runner.name;
       }
@@ -306,8 +314,7 @@ TEST(LightEnvironment, DensityOfASampleIsFoundAgainFromItsDirection) {
       const double sin_theta = std::hypot(samples[i].wi[0], samples[i].wi[2]);
       largest = std::max<double>(largest, samples[i].pdf * sin_theta);
     }
-    const auto found =
-        BestLightRunner().run(LightKernel::look_up_environment, built.view, queries);
+    const auto found = BestLightRunner().run(LightKernel::look_up_environment, built.view, queries);
     for (size_t i = 0; i < samples.size(); ++i) {
       const double sin_theta = std::hypot(samples[i].wi[0], samples[i].wi[2]);
       ASSERT_NEAR(found[i].pdf * sin_theta, samples[i].pdf * sin_theta, largest * 2e-5);
@@ -323,8 +330,7 @@ TEST(LightEnvironment, WhereThereIsRadianceThereIsDensity) {
     for (int i = 0; i < 512; ++i) queries.push_back(Towards((i + 0.37) / 512, (j + 0.37) / 256));
   }
   for (const LightRunner& runner : AllLightRunners()) {
-    for (const LightResult& r :
-         runner.run(LightKernel::look_up_environment, built.view, queries)) {
+    for (const LightResult& r : runner.run(LightKernel::look_up_environment, built.view, queries)) {
       ASSERT_EQ(r.radiance[0] + r.radiance[1] + r.radiance[2] > 0, r.pdf > 0) << runner.name;
     }
   }

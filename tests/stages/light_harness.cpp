@@ -168,7 +168,8 @@ void RunOne(D d, LightKernel kernel, const LightView& view, Mask<D> active, cons
   }
 }
 
-/// What lanes that are not active may hold: numbers that lead nowhere. Placements must be valid even so.
+/// What lanes that are not active may hold: numbers that lead nowhere. Placements must be valid
+/// even so.
 LightQuery Junk() {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   LightQuery q;
@@ -238,7 +239,9 @@ std::vector<LightRunner> AllLightRunners() {
   return runners;
 }
 
-LightRunner BestLightRunner() { return AllLightRunners().front(); }
+LightRunner BestLightRunner() {
+  return AllLightRunners().front();
+}
 
 }  // namespace carpool::stages
 #endif

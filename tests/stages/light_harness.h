@@ -11,16 +11,16 @@
 namespace carpool::stages {
 
 enum class LightKernel {
-  look_up_environment,   // dir -> radiance, pdf (EnvironmentRadiance and EnvironmentPdf must agree)
-  sample_environment,    // u -> wi, radiance, pdf
-  pick_light,            // position, normal, u_pick -> light, pdf, u
-  pick_probability,      // position, normal, light -> pdf
-  sample_triangle,       // p, position, u -> b, wi, distance, pdf
-  triangle_pdf,          // p, position, dir, distance -> pdf
-  sample_light,          // position, normal, u_pick, u -> everything
-  triangle_hit_pdf,      // position, normal, light, p, dir, distance -> pdf
-  environment_hit_pdf,   // dir -> pdf
-  triangle_vertices,     // placement, primitive -> wi, radiance, normal: the vertices; delta: mirrored
+  look_up_environment,  // dir -> radiance, pdf (EnvironmentRadiance and EnvironmentPdf must agree)
+  sample_environment,   // u -> wi, radiance, pdf
+  pick_light,           // position, normal, u_pick -> light, pdf, u
+  pick_probability,     // position, normal, light -> pdf
+  sample_triangle,      // p, position, u -> b, wi, distance, pdf
+  triangle_pdf,         // p, position, dir, distance -> pdf
+  sample_light,         // position, normal, u_pick, u -> everything
+  triangle_hit_pdf,     // position, normal, light, p, dir, distance -> pdf
+  environment_hit_pdf,  // dir -> pdf
+  triangle_vertices,  // placement, primitive -> wi, radiance, normal: the vertices; delta: mirrored
 };
 
 struct LightQuery {
@@ -52,7 +52,7 @@ struct LightResult {
 
 /// One instantiation of the kernels.
 struct LightRunner {
-  std::string name;    // target and width, e.g. "AVX2 x1"
+  std::string name;  // target and width, e.g. "AVX2 x1"
   std::string target;
   std::function<std::vector<LightResult>(LightKernel, const LightView&,
                                          const std::vector<LightQuery>&)>

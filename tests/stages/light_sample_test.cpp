@@ -1,5 +1,5 @@
-// SampleLight over scenes of every kind of light: unbiased, with the densities that MIS asks for, and the
-// fall-off of punctual lights.
+// SampleLight over scenes of every kind of light: unbiased, with the densities that MIS asks for,
+// and the fall-off of punctual lights.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,20 +37,20 @@ LightQuery LookingUp() {
   return q;
 }
 
-/// What an estimate of irradiance gets from a sample; triangle lights of these tests all have radiance
-/// `emission`.
+/// What an estimate of irradiance gets from a sample; triangle lights of these tests all have
+/// radiance `emission`.
 double Irradiance(const LightResult& r, const LightQuery& q, double emission) {
   if (r.pdf == 0) return 0;
-  const double cos = double{r.wi[0]} * q.normal[0] + double{r.wi[1]} * q.normal[1] +
-                     double{r.wi[2]} * q.normal[2];
+  const double cos =
+      double{r.wi[0]} * q.normal[0] + double{r.wi[1]} * q.normal[1] + double{r.wi[2]} * q.normal[2];
   const bool triangle = r.light != kNone && !r.delta;
   return std::max(0.0, cos) * r.radiance[0] * (triangle ? emission : 1) / r.pdf;
 }
 
 double MeanIrradiance(const LightScene& s, const LightRunner& runner, const LightQuery& receiver,
                       double emission, MeanEstimate& estimate) {
-  for (const LightResult& r : runner.run(LightKernel::sample_light, s.view,
-                                         WithRandomNumbers(receiver, 50000, 61))) {
+  for (const LightResult& r :
+       runner.run(LightKernel::sample_light, s.view, WithRandomNumbers(receiver, 50000, 61))) {
     estimate.Add(Irradiance(r, receiver, emission));
   }
   return estimate.mean();
@@ -226,8 +226,8 @@ TEST(LightSample, SpotConeFollowsTheExtension) {
       p.direction[0] = static_cast<float>(std::sin(angle));
       p.direction[1] = static_cast<float>(-std::cos(angle));
       p.direction[2] = 0;
-      const double t = std::clamp((std::cos(angle) - std::cos(0.5)) / (std::cos(0.3) - std::cos(0.5)),
-                                  0.0, 1.0);
+      const double t =
+          std::clamp((std::cos(angle) - std::cos(0.5)) / (std::cos(0.3) - std::cos(0.5)), 0.0, 1.0);
       EXPECT_NEAR(SinglePunctual(runner, p), t * t, 2e-5) << runner.name << angle;
     }
   }

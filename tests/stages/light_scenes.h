@@ -51,8 +51,8 @@ struct LightScene {
   }
 };
 
-/// `count` emitters within a cube of 20 m, their powers spread evenly over so many decades: two thirds are
-/// triangles of all orientations and sides, the rest points and spots.
+/// `count` emitters within a cube of 20 m, their powers spread evenly over so many decades: two
+/// thirds are triangles of all orientations and sides, the rest points and spots.
 inline LightScene RandomLights(int count, double decades, uint32_t seed) {
   LightScene s;
   std::mt19937 rng(seed);

@@ -1,4 +1,5 @@
-// Statistical tests of estimators: z of a mean, chi-squared of counts, with their false-alarm rates.
+// Statistical tests of estimators: z of a mean, chi-squared of counts, with their false-alarm
+// rates.
 #pragma once
 
 #include <cmath>
@@ -7,8 +8,9 @@
 
 namespace carpool::stages {
 
-/// A correct estimator exceeds these with probability 1e-6; seeds are fixed, so a pass stays a pass.
-constexpr double kLargestZ = 4.9;            // two-sided
+/// A correct estimator exceeds these with probability 1e-6; seeds are fixed, so a pass stays a
+/// pass.
+constexpr double kLargestZ = 4.9;             // two-sided
 constexpr double kLargestChiSquaredZ = 4.76;  // one-sided
 
 /// Mean and standard error of independent samples.
@@ -25,8 +27,8 @@ class MeanEstimate {
     const double n = static_cast<double>(count_);
     return std::sqrt(squares_ / (n - 1) / n);
   }
-  /// Standard errors between the mean and the truth; `rounding` is the relative error that the float
-  /// arithmetic of the estimator may have.
+  /// Standard errors between the mean and the truth; `rounding` is the relative error that the
+  /// float arithmetic of the estimator may have.
   double Z(double truth, double rounding) const {
     return std::abs(mean_ - truth) / std::hypot(standard_error(), rounding * truth);
   }
@@ -36,8 +38,8 @@ class MeanEstimate {
   double mean_ = 0, squares_ = 0;
 };
 
-/// Chi-squared of counts against expectations, as a normal deviate (Wilson & Hilferty 1931). Cells that
-/// expect fewer than 10 are pooled. A count where none is expected gives infinity.
+/// Chi-squared of counts against expectations, as a normal deviate (Wilson & Hilferty 1931). Cells
+/// that expect fewer than 10 are pooled. A count where none is expected gives infinity.
 inline double ChiSquaredZ(const std::vector<double>& expected, const std::vector<double>& counts) {
   double chi = 0, pooled_expected = 0, pooled_count = 0;
   int cells = 0;

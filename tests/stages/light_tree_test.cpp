@@ -1,5 +1,5 @@
-// Picking from the light tree: probabilities that add up, agree with what is picked, and starve no light
-// that contributes (HARD_CASES 33, 46).
+// Picking from the light tree: probabilities that add up, agree with what is picked, and starve no
+// light that contributes (HARD_CASES 33, 46).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -46,8 +46,8 @@ TEST(LightTree, ProbabilitiesSumToOneOverTwelveDecades) {
       for (const double p : Probabilities(runner, s, receiver)) sum += p;
       // What is missing is the share of clusters that turn out, further down, to shine elsewhere.
       double nothing = 0;
-      const auto picks = runner.run(LightKernel::pick_light, s.view,
-                                    WithPickNumbers(receiver, 100000, 33));
+      const auto picks =
+          runner.run(LightKernel::pick_light, s.view, WithPickNumbers(receiver, 100000, 33));
       for (const LightResult& r : picks) nothing += r.light == kNone;
       nothing /= static_cast<double>(picks.size());
       const double error = std::sqrt(std::max(nothing, 1e-5) / static_cast<double>(picks.size()));
@@ -106,7 +106,9 @@ TEST(LightTree, PickAndProbabilityAgree) {
   std::vector<LightQuery> queries;
   for (int i = 0; i < 20000; ++i) {
     queries.push_back(RandomReceiver(rng, i));
-    queries.back().u_pick = i == 0 ? 0 : i == 1 ? kLargestBelowOne : static_cast<float>(rng() >> 8) * 0x1p-24f;
+    queries.back().u_pick = i == 0   ? 0
+                            : i == 1 ? kLargestBelowOne
+                                     : static_cast<float>(rng() >> 8) * 0x1p-24f;
   }
   for (const LightRunner& runner : AllLightRunners()) {
     const auto picks = runner.run(LightKernel::pick_light, s.view, queries);
@@ -134,9 +136,8 @@ TEST(LightTree, TheRemappedNumberIsUniform) {
   const LightScene s = RandomLights(3000, 6, 44);
   std::mt19937 rng(45);
   std::vector<double> expected(64, kPicks / 64.0), counts(64);
-  for (const LightResult& r :
-       BestLightRunner().run(LightKernel::pick_light, s.view,
-                             WithPickNumbers(RandomReceiver(rng, 1), kPicks, 46))) {
+  for (const LightResult& r : BestLightRunner().run(
+           LightKernel::pick_light, s.view, WithPickNumbers(RandomReceiver(rng, 1), kPicks, 46))) {
     ++counts[static_cast<size_t>(r.u * 64)];
   }
   EXPECT_LT(ChiSquaredZ(expected, counts), kLargestChiSquaredZ);
@@ -239,9 +240,8 @@ TEST(LightTree, ReceiversOnALightGetFiniteProbabilities) {
     for (size_t light = 0; light < s.scene.lights.lights.size(); light += 7) {
       LightQuery receiver;
       const Light& record = s.scene.lights.lights[light];
-      const float* at = record.type <= LightType::two_sided_triangle
-                            ? s.triangles[light].p0
-                            : record.position;
+      const float* at =
+          record.type <= LightType::two_sided_triangle ? s.triangles[light].p0 : record.position;
       std::copy(at, at + 3, receiver.position);
       double sum = 0;
       for (const double p : Probabilities(runner, s, receiver)) sum += p;
@@ -280,7 +280,8 @@ TEST(LightTree, WidthDoesNotMatter) {
   const auto runners = AllLightRunners();
   for (size_t i = 0; i + 1 < runners.size(); i += 2) {
     for (const LightKernel kernel : {LightKernel::pick_light, LightKernel::pick_probability}) {
-      EXPECT_EQ(runners[i].run(kernel, s.view, queries), runners[i + 1].run(kernel, s.view, queries))
+      EXPECT_EQ(runners[i].run(kernel, s.view, queries),
+                runners[i + 1].run(kernel, s.view, queries))
           << runners[i].target;
     }
   }

@@ -1,4 +1,5 @@
-// Sampling a triangle light: unbiased for every solid angle, and its density found again (HARD_CASES 25, 26, 29).
+// Sampling a triangle light: unbiased for every solid angle, and its density found again
+// (HARD_CASES 25, 26, 29).
 #include <gtest/gtest.h>
 
 #include <array>
@@ -16,15 +17,27 @@ constexpr double kPi = std::numbers::pi;
 constexpr float kLargestBelowOne = 0x1.fffffep-1f;
 
 using V = std::array<double, 3>;
-V operator-(const V& a, const V& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-V operator*(const V& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-V operator+(const V& a, const V& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-double Dot(const V& a, const V& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+V operator-(const V& a, const V& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+V operator*(const V& a, double s) {
+  return {a[0] * s, a[1] * s, a[2] * s};
+}
+V operator+(const V& a, const V& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+double Dot(const V& a, const V& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 V Cross(const V& a, const V& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-V Unit(const V& a) { return a * (1 / std::sqrt(Dot(a, a))); }
-V FromFloat(const float f[3]) { return {f[0], f[1], f[2]}; }
+V Unit(const V& a) {
+  return a * (1 / std::sqrt(Dot(a, a)));
+}
+V FromFloat(const float f[3]) {
+  return {f[0], f[1], f[2]};
+}
 
 /// Lambert 1760: irradiance of a polygon of radiance 1 that lies above the horizon of `normal`.
 double LambertIrradiance(const V p[3], const V& ref, const V& normal) {
@@ -72,8 +85,8 @@ std::vector<LightQuery> WithRandomNumbers(const LightQuery& query, size_t count,
 
 /// A unit triangle of some shape at a height over the receiver, which faces it.
 Case AtHeight(double height, double shift, double aspect) {
-  return Case({-1, -0.6 * aspect, height}, {1.1, -0.5 * aspect, height}, {0.1, 0.9 * aspect, height},
-              {shift, 0, 0}, {0, 0, 1});
+  return Case({-1, -0.6 * aspect, height}, {1.1, -0.5 * aspect, height},
+              {0.1, 0.9 * aspect, height}, {shift, 0, 0}, {0, 0, 1});
 }
 
 std::vector<Case> CasesOfAllSolidAngles() {
@@ -108,8 +121,8 @@ TEST(LightTriangle, MeanIsLambertsFormula) {
       least = std::min(least, omega);
       greatest = std::max(greatest, omega);
       MeanEstimate irradiance, solid_angle;
-      for (const LightResult& r : runner.run(LightKernel::sample_triangle, {},
-                                             WithRandomNumbers(c.query, 20000, 21))) {
+      for (const LightResult& r :
+           runner.run(LightKernel::sample_triangle, {}, WithRandomNumbers(c.query, 20000, 21))) {
         const double inverse = r.pdf > 0 ? 1 / r.pdf : 0.0;
         irradiance.Add(std::max(0.0, Dot(FromFloat(r.wi), c.normal)) * inverse);
         solid_angle.Add(inverse);
@@ -155,7 +168,8 @@ TEST(LightTriangle, PointsAreUniformOverTheSolidAngle) {
     const double h = 1.0 / kDivisions;
     for (int i = 0; i < kDivisions; ++i) {
       for (int j = 0; i + j < kDivisions; ++j) {
-        const V lower[3] = {point(i * h, j * h), point((i + 1) * h, j * h), point(i * h, (j + 1) * h)};
+        const V lower[3] = {point(i * h, j * h), point((i + 1) * h, j * h),
+                            point(i * h, (j + 1) * h)};
         const V upper[3] = {point((i + 1) * h, (j + 1) * h), lower[1], lower[2]};
         const size_t at = 2ul * (i * kDivisions + j);
         expected[at] = SolidAngle(lower, c.ref) / omega * kSamples;
@@ -213,8 +227,8 @@ TEST(LightTriangle, DirectionAndDistanceLeadToThePoint) {
 
 TEST(LightTriangle, ReceiverOnTheLightGetsFiniteNumbers) {
   const V p0 = {-1, -0.6, 0}, p1 = {1.1, -0.5, 0}, p2 = {0.1, 0.9, 0};
-  std::vector<V> receivers = {p0, p1, p2, p0 * 0.5 + p1 * 0.5, p0 * 0.3 + p1 * 0.3 + p2 * 0.4,
-                              p1 * 2 + p0 * -1};
+  std::vector<V> receivers = {
+      p0, p1, p2, p0 * 0.5 + p1 * 0.5, p0 * 0.3 + p1 * 0.3 + p2 * 0.4, p1 * 2 + p0 * -1};
   for (const double height : {0.0, 1e-30, 1e-12, 1e-7, 1e-4}) {
     for (const V& at : receivers) {
       Case c(p0, p1, p2, {at[0], at[1], height}, {0, 0, 1});

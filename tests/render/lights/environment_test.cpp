@@ -1,4 +1,5 @@
-// Environment tables: integer masses in proportion to luminance x sin(theta), nothing for black, nothing lost.
+// Environment tables: integer masses in proportion to luminance x sin(theta), nothing for black,
+// nothing lost.
 #include "render/lights/environment.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// The light tree as built: one leaf per light, clusters that hold their lights, the same for any thread count.
+// The light tree as built: one leaf per light, clusters that hold their lights, the same for any
+// thread count.
 #include "render/lights/light_tree.h"
 
 #include <gtest/gtest.h>
@@ -128,9 +129,11 @@ TEST(LightTreeBuild, IsTheSameForAnyThreadCount) {
   const SceneTables serial = Built(input);
   ASSERT_EQ(all.lights.nodes.size(), serial.lights.nodes.size());
   EXPECT_EQ(std::memcmp(all.lights.nodes.data(), serial.lights.nodes.data(),
-                        all.lights.nodes.size() * sizeof(LightNode)), 0);
+                        all.lights.nodes.size() * sizeof(LightNode)),
+            0);
   EXPECT_EQ(std::memcmp(all.lights.lights.data(), serial.lights.lights.data(),
-                        all.lights.lights.size() * sizeof(Light)), 0);
+                        all.lights.lights.size() * sizeof(Light)),
+            0);
 }
 
 TEST(LightTreeBuild, PlacementsFindTheirLights) {
