@@ -2,6 +2,7 @@
 #include "contestants.h"
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <utility>

@@ -2,7 +2,7 @@
 // key.
 #pragma once
 
-#include <atomic>
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <ctime>
@@ -42,12 +42,17 @@ inline Item make_item(const Work& work, std::uint64_t id) {
   return {.hash = hash, .left = is_long ? 1000 : hops, .id = static_cast<std::uint32_t>(id)};
 }
 
+// A hash's upper bits as a number below `count`, without a division.
+inline std::uint32_t below(std::uint32_t count, std::uint32_t bits) {
+  return static_cast<std::uint32_t>(std::uint64_t{bits} * count >> 32);
+}
+
 inline std::uint32_t stage_of(const Work& work, std::uint64_t hash) {
-  return static_cast<std::uint32_t>((hash >> 48) % work.stages);
+  return below(work.stages, static_cast<std::uint32_t>(hash >> 32));
 }
 
 inline std::uint32_t key_of(const Work& work, std::uint64_t hash) {
-  return static_cast<std::uint32_t>((hash >> 32 & 0xffff) % work.keys);
+  return below(work.keys, static_cast<std::uint32_t>(hash));
 }
 
 // visit is one hop. The time is in the chain: the next round needs the result of the one before.

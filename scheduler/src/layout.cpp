@@ -23,9 +23,10 @@ std::uint64_t round_up_to_line(std::uint64_t bytes) {
   return (bytes + kLine - 1) / kLine * kLine;
 }
 
+// 0 for one item, 1 for two to four, 2 for five to sixteen, ...
 std::uint32_t grade_of(std::uint32_t least_items) {
-  const auto log2 = static_cast<std::uint32_t>(std::bit_width(least_items) - 1);
-  return std::min(log2 / 2, kGrades - 1);
+  const auto bits = static_cast<std::uint32_t>(std::bit_width(least_items - 1));
+  return std::min((bits + 1) / 2, kGrades - 1);
 }
 
 }  // namespace
@@ -153,11 +154,12 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
   }
 }
 
-// From what fits one cache line, though at most four items, in steps of four to the full block.
+// One item, four, sixteen, ..., the full block. Two items or more are told from one because where
+// keys are as many as items, choosing bins that hold two halves the number of batches.
 void Layout::build_ladder(StageLayout& stage, std::uint64_t thrift) const {
   const std::uint64_t full = round_up_to_line(std::uint64_t{stage.item_bytes} * stage.block_items);
   const std::uint64_t smallest = std::min(full, thrift / kLine * kLine);
-  std::uint64_t items = std::clamp<std::uint64_t>(kLine / stage.item_bytes, 1, 4);
+  std::uint64_t items = 1;
   std::uint32_t least = 1;
   for (std::uint32_t level = 0; level < kMaxLevels; ++level) {
     if (items * 2 > stage.block_items || level + 1 == kMaxLevels) {

@@ -12,7 +12,7 @@
 namespace carpool {
 
 inline constexpr std::uint32_t kMaxLevels = 16;
-inline constexpr std::uint32_t kGrades = 6;  // see OpenTable
+inline constexpr std::uint32_t kGrades = 7;  // see OpenTable
 inline constexpr std::uint32_t kPartialsPerWorker =
     16;  // published partial blocks a worker may have out
 
@@ -22,7 +22,7 @@ struct BlockLevel {
   std::uint32_t items = 0;       // when it has so many it goes up
   std::uint32_t bytes = 0;       // size of its memory
   std::uint32_t pool_class = 0;  // where that comes from
-  std::uint32_t grade = 0;       // how full it is, as a power of four
+  std::uint32_t grade = 0;       // how full it is, as a logarithm
 };
 
 struct StageLayout {

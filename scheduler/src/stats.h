@@ -29,6 +29,7 @@ struct StageStats {
   std::uint64_t seats = 0;  // lanes offered
   std::uint64_t steals = 0;
   std::uint64_t kernel_ticks = 0;
+  bool slow = false;  // the last batch took so long that timing each costs nothing
   std::array<std::uint64_t, kFlushCauses> causes{};
 };
 

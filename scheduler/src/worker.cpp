@@ -15,6 +15,8 @@ namespace {
 // items do.
 constexpr std::uint32_t kTinyBatch = 32;
 constexpr std::uint32_t kTinySample = 8;
+constexpr std::uint64_t kSlowBatchTicks = 4'000;
+constexpr std::uint64_t kInterruptedTicks = 100'000;
 
 // How long a worker without work looks around before it leaves, and how long an owner waits after
 // sharing in vain: about the cost of an invitation. In ticks; at 1 to 4 GHz some 5 to 20
@@ -188,7 +190,7 @@ void Worker::perform(const Work& work) {
 
 void Worker::run_batch(const Work& work) {
   const Block& block = work.block;
-  const bool tiny = block.items < kTinyBatch && !always_timed_;
+  const bool tiny = block.items < kTinyBatch && !always_timed_ && !stats_.stages[block.stage].slow;
   const bool timed = !tiny || ++tiny_batches_ >= kTinySample;
   const std::uint64_t began = timed ? core_.clock.ticks() : 0;
   open_.begin_call(block.stage, core_.allowed_from(block.stage));
@@ -197,8 +199,13 @@ void Worker::run_batch(const Work& work) {
   std::uint64_t ticks = 0;
   if (timed) {
     now_ = core_.clock.ticks();
-    ticks = (now_ - began + work.virtual_ticks) * (tiny ? tiny_batches_ : 1);
-    tiny_batches_ = tiny ? 0 : tiny_batches_;
+    ticks = now_ - began + work.virtual_ticks;
+    stats_.stages[block.stage].slow = ticks > kSlowBatchTicks;
+    if (tiny) {
+      // A sample stands for those that were not timed, but not if the system took the core away.
+      ticks *= ticks < kInterruptedTicks ? tiny_batches_ : 1;
+      tiny_batches_ = 0;
+    }
   }
   count_batch(work, ticks);
   const StageLayout& stage = layout_.stages[block.stage];
