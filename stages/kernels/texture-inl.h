@@ -35,42 +35,114 @@ struct Rgba {
 
 namespace texture_detail {
 
+// Most batches use one material, so that all lanes want the same slot. Then its fields are plain
+// int32_t and what follows from them plain bool, and code branches; otherwise they are Int<D> and
+// Mask<D>, and code blends. The overloads below let one source serve both, with the same bits in
+// every lane.
+
+template <class D>
+HWY_INLINE bool Test(D, int32_t field, int32_t value) {
+  return field == value;
+}
+template <class D>
+HWY_INLINE Mask<D> Test(D d, Int<D> field, int32_t value) {
+  return hn::RebindMask(d, hn::Eq(field, hn::Set(IntTag<D>(), value)));
+}
+template <class D>
+HWY_INLINE bool HasFlag(D, int32_t flags, int32_t flag) {
+  return (flags & flag) != 0;
+}
 template <class D>
 HWY_INLINE Mask<D> HasFlag(D d, Int<D> flags, int32_t flag) {
-  const IntTag<D> di;
-  const Int<D> bit = hn::Set(di, flag);
-  return hn::RebindMask(d, hn::Eq(hn::And(flags, bit), bit));
+  return Test(d, hn::And(flags, hn::Set(IntTag<D>(), flag)), flag);
+}
+HWY_INLINE bool Not(bool a) {
+  return !a;
+}
+template <class M>
+HWY_INLINE M Not(M a) {
+  return hn::Not(a);
+}
+HWY_INLINE bool Both(bool a, bool b) {
+  return a && b;
+}
+template <class M>
+HWY_INLINE M Both(M a, M b) {
+  return hn::And(a, b);
 }
 template <class D>
-HWY_INLINE Mask<D> IsEqual(D d, Int<D> value, int32_t other) {
-  return hn::RebindMask(d, hn::Eq(value, hn::Set(IntTag<D>(), other)));
+HWY_INLINE bool Any(D, bool condition) {
+  return condition;
+}
+template <class D>
+HWY_INLINE bool Any(D d, Mask<D> condition) {
+  return !hn::AllFalse(d, condition);
+}
+template <class D>
+HWY_INLINE bool All(D, bool condition) {
+  return condition;
+}
+template <class D>
+HWY_INLINE bool All(D d, Mask<D> condition) {
+  return hn::AllTrue(d, condition);
+}
+/// `yes()` or `no()`, each a Real or Int: only what is needed is evaluated.
+template <class D, class Yes, class No>
+HWY_INLINE auto Choose(D, bool condition, const Yes& yes, const No& no) {
+  return condition ? yes() : no();
+}
+template <class D, class Yes, class No>
+HWY_INLINE auto Choose(D, Mask<D> condition, const Yes& yes, const No& no) {
+  const auto chosen = yes();
+  const hn::DFromV<decltype(no())> tag;
+  return hn::IfThenElse(hn::RebindMask(tag, condition), chosen, no());
+}
+template <class D>
+HWY_INLINE Real<D> ToReal(D d, int32_t field) {
+  return hn::Set(d, static_cast<float>(field));
+}
+template <class D>
+HWY_INLINE Real<D> ToReal(D d, Int<D> field) {
+  return hn::ConvertTo(d, field);
 }
 
-/// Reads fields of one record per lane. Most batches use one material, so that all lanes want the
-/// same record: then a field is one scalar load instead of a gather.
+/// Reads fields of the record that all lanes share.
 template <class Record, class D>
-class RecordReader {
+class SharedRecord {
  public:
-  /// `index` is valid in every lane; `first` is one of them; `same` says that all equal it.
-  RecordReader(const Record* base, Int<D> index, int32_t first, bool same)
-      : base_(base), index_(index), first_(first), same_(hn::MaxLanes(D()) == 1 || same) {}
-
-  HWY_INLINE Int<D> IntAt(size_t offset) const {
-    if (!same_) return FieldInt(D(), base_, index_, offset);
-    return hn::Set(IntTag<D>(), reinterpret_cast<const int32_t*>(base_ + first_)[offset / 4]);
+  explicit SharedRecord(const Record* record) : record_(record) {}
+  HWY_INLINE int32_t IntAt(size_t offset) const {
+    return reinterpret_cast<const int32_t*>(record_)[offset / 4];
   }
   HWY_INLINE Real<D> RealAt(size_t offset) const {
-    if (!same_) return FieldReal(D(), base_, index_, offset);
-    return hn::Set(D(), reinterpret_cast<const float*>(base_ + first_)[offset / 4]);
+    return hn::Set(D(), reinterpret_cast<const float*>(record_)[offset / 4]);
   }
-  int32_t first() const { return first_; }
-  bool same() const { return same_; }
+  /// Word `index` of an array of words in the record.
+  HWY_INLINE Int<D> WordAt(size_t offset, Int<D> index) const {
+    return GatherInt(D(), reinterpret_cast<const int32_t*>(record_) + offset / 4, index);
+  }
+
+ private:
+  const Record* record_;
+};
+
+/// Reads fields of one record per lane.
+template <class Record, class D>
+class LaneRecords {
+ public:
+  LaneRecords(const Record* base, Int<D> index) : base_(base), index_(index) {}
+  HWY_INLINE Int<D> IntAt(size_t offset) const { return FieldInt(D(), base_, index_, offset); }
+  HWY_INLINE Real<D> RealAt(size_t offset) const { return FieldReal(D(), base_, index_, offset); }
+  HWY_INLINE Int<D> WordAt(size_t offset, Int<D> index) const {
+    const IntTag<D> di;
+    return GatherInt(D(), base_,
+                     index_ * hn::Set(di, static_cast<int32_t>(sizeof(Record) / 4)) +
+                         hn::Set(di, static_cast<int32_t>(offset / 4)) + index);
+  }
 
  private:
   const Record* base_;
   Int<D> index_;
-  int32_t first_;
-  bool same_;
 };
 
 /// log2 of a positive normal float, within 2e-5; exact for powers of two.
@@ -90,16 +162,24 @@ HWY_INLINE Real<D> FastLog2(D d, Real<D> x) {
 }
 
 /// The coordinate brought into [0, 1] by the wrap mode.
-template <class D>
-HWY_INLINE Real<D> WrapUnit(D d, Real<D> u, Int<D> mode) {
-  const Real<D> one = Splat(d, 1);
-  const Real<D> repeat = u - hn::Floor(u);  // exact, but 1 for tiny negative u
-  const Real<D> clamp = hn::Min(hn::Max(u, hn::Zero(d)), one);
-  const Real<D> period = u - Splat(d, 2) * hn::Floor(u * Splat(d, 0.5));
-  const Real<D> mirror = hn::Min(period, Splat(d, 2) - period);
-  return hn::IfThenElse(IsEqual(d, mode, kWrapRepeat), repeat,
-                        hn::IfThenElse(IsEqual(d, mode, kWrapMirror), mirror, clamp));
+template <class D, class Field>
+HWY_INLINE Real<D> WrapUnit(D d, Real<D> u, Field mode) {
+  const auto repeat = [&] { return u - hn::Floor(u); };  // exact, but 1 for tiny negative u
+  const auto clamp = [&] { return hn::Min(hn::Max(u, hn::Zero(d)), Splat(d, 1)); };
+  const auto mirror = [&] {
+    const Real<D> period = u - Splat(d, 2) * hn::Floor(u * Splat(d, 0.5));
+    return hn::Min(period, Splat(d, 2) - period);
+  };
+  return Choose(d, Test(d, mode, kWrapRepeat), repeat,
+                [&] { return Choose(d, Test(d, mode, kWrapMirror), mirror, clamp); });
 }
+
+/// Which lanes take their nearest texel alone, and whether there are any.
+template <class D>
+struct Nearest {
+  Mask<D> mask;
+  bool any;
+};
 
 /// The two texels of one axis and the weight of the second.
 template <class D>
@@ -110,79 +190,103 @@ struct Axis {
 
 /// Neighbours outside the image are its other end when repeating, else the edge texel, which is
 /// also what a mirror shows. Nearest lanes get weight 0.
-template <class D>
-HWY_INLINE Axis<D> ResolveAxis(D d, Real<D> unit, Real<D> size, Mask<D> repeat, Mask<D> nearest) {
+template <class D, class Field>
+HWY_INLINE Axis<D> ResolveAxis(D d, Real<D> u, Field wrap, Real<D> size,
+                               const Nearest<D>& nearest) {
   const IntTag<D> di;
-  const Real<D> last = size - Splat(d, 1);
-  const Real<D> x = unit * size;
-  const Real<D> position = hn::IfThenElse(nearest, hn::Min(hn::Floor(x), last), x - Splat(d, 0.5));
+  const Real<D> zero = hn::Zero(d), last = size - Splat(d, 1);
+  const Real<D> x = WrapUnit(d, u, wrap) * size;
+  Real<D> position = x - Splat(d, 0.5);
+  if (nearest.any) {
+    position = hn::IfThenElse(nearest.mask, hn::Min(hn::Floor(x), last), position);
+  }
   const Real<D> low = hn::Floor(position);  // -1 .. size - 1
   const Real<D> high = low + Splat(d, 1);   // 0 .. size
-  const Real<D> before = hn::IfThenElseZero(repeat, last);
-  const Real<D> after = hn::IfThenZeroElse(repeat, last);
-  return {hn::ConvertTo(di, hn::IfThenElse(hn::Lt(low, hn::Zero(d)), before, low)),
+  const auto first_texel = [&] { return zero; };
+  const auto last_texel = [&] { return last; };
+  const auto repeat = Test(d, wrap, kWrapRepeat);
+  const Real<D> before = Choose(d, repeat, last_texel, first_texel);
+  const Real<D> after = Choose(d, repeat, first_texel, last_texel);
+  return {hn::ConvertTo(di, hn::IfThenElse(hn::Lt(low, zero), before, low)),
           hn::ConvertTo(di, hn::IfThenElse(hn::Gt(high, last), after, high)), position - low};
 }
 
-/// How the texels of each lane are stored, with what the whole vector has in common.
-template <class D>
+/// How texels are stored; `Condition` is bool or Mask<D>.
+template <class D, class Condition>
 struct Encoding {
-  Mask<D> wide, srgb8, srgb16;
+  Condition wide, srgb;
   Real<D> scale;  // integer code to [0, 1]
-  bool any_wide, any_srgb8, any_srgb16;
 };
-template <class D>
-HWY_INLINE Encoding<D> MakeEncoding(D d, Int<D> format, Int<D> srgb_flag) {
-  const Mask<D> wide = IsEqual(d, format, static_cast<int32_t>(TexelFormat::rgba16));
-  const Mask<D> srgb = hn::Not(IsEqual(d, srgb_flag, 0));
-  const Mask<D> srgb8 = hn::AndNot(wide, srgb);
-  const Mask<D> srgb16 = hn::And(wide, srgb);
-  return {wide,
-          srgb8,
-          srgb16,
-          hn::IfThenElse(wide, Splat(d, 1.0 / 65535), Splat(d, 1.0 / 255)),
-          !hn::AllFalse(d, wide),
-          !hn::AllFalse(d, srgb8),
-          !hn::AllFalse(d, srgb16)};
+template <class D, class Field>
+HWY_INLINE auto MakeEncoding(D d, Field format, Field srgb_flag) {
+  const auto wide = Test(d, format, static_cast<int32_t>(TexelFormat::rgba16));
+  const Real<D> scale = Choose(
+      d, wide, [&] { return Splat(d, 1.0 / 65535); }, [&] { return Splat(d, 1.0 / 255); });
+  return Encoding<D, decltype(wide)>{wide, Not(Test(d, srgb_flag, 0)), scale};
 }
 
+/// Linear light of `code` where `condition` holds, else `value`; codes elsewhere may exceed the
+/// table.
 template <class D>
-HWY_INLINE Real<D> DecodeColor(D d, const TextureTablesView& t, const Encoding<D>& encoding,
-                               Int<D> code) {
-  const IntTag<D> di;
+HWY_INLINE Real<D> LookUp(D d, const float* table, bool, Int<D> code, Real<D>) {
+  return GatherReal(d, table, code);
+}
+template <class D>
+HWY_INLINE Real<D> LookUp(D d, const float* table, Mask<D> condition, Int<D> code, Real<D> value) {
+  const Int<D> index = hn::IfThenElseZero(hn::RebindMask(IntTag<D>(), condition), code);
+  return hn::IfThenElse(condition, GatherReal(d, table, index), value);
+}
+
+template <class D, class Condition>
+HWY_INLINE Real<D> DecodeColor(D d, const TextureTablesView& t,
+                               const Encoding<D, Condition>& encoding, Int<D> code) {
   Real<D> value = hn::ConvertTo(d, code) * encoding.scale;
-  if (encoding.any_srgb8) {
-    const Int<D> index = hn::IfThenElseZero(hn::RebindMask(di, encoding.srgb8), code);
-    value = hn::IfThenElse(encoding.srgb8, GatherReal(d, t.srgb8, index), value);
-  }
-  if (encoding.any_srgb16) {
-    const Int<D> index = hn::IfThenElseZero(hn::RebindMask(di, encoding.srgb16), code);
-    value = hn::IfThenElse(encoding.srgb16, GatherReal(d, t.srgb16, index), value);
-  }
+  const Condition srgb8 = Both(Not(encoding.wide), encoding.srgb);
+  if (Any(d, srgb8)) value = LookUp(d, t.srgb8, srgb8, code, value);
+  const Condition srgb16 = Both(encoding.wide, encoding.srgb);
+  if (Any(d, srgb16)) value = LookUp(d, t.srgb16, srgb16, code, value);
   return value;
 }
 
-/// The decoded texel number `texel` of the level that starts at word `offset`.
+/// A texel as it is stored; `second` is there for 16 bits only.
 template <class D>
-HWY_INLINE Rgba<D> FetchTexel(D d, const TextureTablesView& t, const Encoding<D>& encoding,
-                              Int<D> offset, Int<D> texel) {
+struct TexelWords {
+  Int<D> first, second;
+};
+/// Texel number `texel` of the level that starts at word `offset`.
+template <class D, class Condition>
+HWY_INLINE TexelWords<D> FetchTexel(D d, const TextureTablesView& t,
+                                    const Encoding<D, Condition>& encoding, Int<D> offset,
+                                    Int<D> texel) {
   const IntTag<D> di;
-  const auto wide = hn::RebindMask(di, encoding.wide);
-  const Int<D> index = offset + texel + hn::IfThenElseZero(wide, texel);
-  const Int<D> word = GatherInt(d, t.words, index);
-  const Int<D> byte = hn::Set(di, 0xff);
-  Int<D> r = hn::And(word, byte);
-  Int<D> g = hn::And(hn::ShiftRight<8>(word), byte);
-  Int<D> b = hn::And(hn::ShiftRight<16>(word), byte);
-  Int<D> a = hn::And(hn::ShiftRight<24>(word), byte);
-  if (encoding.any_wide) {
-    const Int<D> half = hn::Set(di, 0xffff);
-    const Int<D> second = GatherInt(d, t.words, index + hn::IfThenElseZero(wide, hn::Set(di, 1)));
-    r = hn::IfThenElse(wide, hn::And(word, half), r);
-    g = hn::IfThenElse(wide, hn::And(hn::ShiftRight<16>(word), half), g);
-    b = hn::IfThenElse(wide, hn::And(second, half), b);
-    a = hn::IfThenElse(wide, hn::And(hn::ShiftRight<16>(second), half), a);
-  }
+  const auto zero = [&] { return hn::Zero(di); };
+  const auto one = [&] { return hn::Set(di, 1); };
+  const Int<D> index = offset + texel +
+                       Choose(
+                           d, encoding.wide, [&] { return texel; }, zero);
+  const Int<D> first = GatherInt(d, t.words, index);
+  if (!Any(d, encoding.wide)) return {first, first};
+  return {first, GatherInt(d, t.words, index + Choose(d, encoding.wide, one, zero))};
+}
+
+template <class D, class Condition>
+HWY_INLINE Rgba<D> DecodeTexel(D d, const TextureTablesView& t,
+                               const Encoding<D, Condition>& encoding, const TexelWords<D>& word) {
+  const IntTag<D> di;
+  const Int<D> byte = hn::Set(di, 0xff), half = hn::Set(di, 0xffff);
+  const Condition wide = encoding.wide;
+  const Int<D> r = Choose(
+      d, wide, [&] { return hn::And(word.first, half); },
+      [&] { return hn::And(word.first, byte); });
+  const Int<D> g = Choose(
+      d, wide, [&] { return hn::And(hn::ShiftRight<16>(word.first), half); },
+      [&] { return hn::And(hn::ShiftRight<8>(word.first), byte); });
+  const Int<D> b = Choose(
+      d, wide, [&] { return hn::And(word.second, half); },
+      [&] { return hn::And(hn::ShiftRight<16>(word.first), byte); });
+  const Int<D> a = Choose(
+      d, wide, [&] { return hn::And(hn::ShiftRight<16>(word.second), half); },
+      [&] { return hn::And(hn::ShiftRight<24>(word.first), byte); });
   return {{DecodeColor(d, t, encoding, r), DecodeColor(d, t, encoding, g),
            DecodeColor(d, t, encoding, b)},
           hn::ConvertTo(d, a) * encoding.scale};
@@ -194,25 +298,28 @@ HWY_INLINE Rgba<D> Lerp(const Rgba<D>& a, const Rgba<D>& b, Real<D> weight) {
   return {MulAdd(Sub(b.rgb, a.rgb), weight, a.rgb), hn::MulAdd(b.a - a.a, weight, a.a)};
 }
 
-/// UV after KHR_texture_transform and the log2 of the square root of the area factor it brings.
+/// UV after KHR_texture_transform, and the factor by which it scales areas.
 template <class D>
 struct Coordinates {
   Real<D> u, v, area;
 };
-template <class D>
-HWY_INLINE Coordinates<D> Transform(D d, const RecordReader<TextureSlot, D>& slot,
-                                    const Vec2<D>& uv) {
-  const Mask<D> moved = hn::Not(IsEqual(d, slot.IntAt(offsetof(TextureSlot, has_transform)), 0));
+template <class D, class Slot>
+HWY_INLINE Coordinates<D> Transform(D d, const Slot& slot, const Vec2<D>& uv) {
+  const auto moved = Not(Test(d, slot.IntAt(offsetof(TextureSlot, has_transform)), 0));
   Coordinates<D> at{uv.x, uv.y, Splat(d, 1)};
-  if (!hn::AllFalse(d, moved)) {
+  if (Any(d, moved)) {
     constexpr size_t kBase = offsetof(TextureSlot, transform);
     const Real<D> u_of_u = slot.RealAt(kBase), u_of_v = slot.RealAt(kBase + 4);
     const Real<D> v_of_u = slot.RealAt(kBase + 12), v_of_v = slot.RealAt(kBase + 16);
     const Real<D> u = hn::MulAdd(u_of_u, uv.x, hn::MulAdd(u_of_v, uv.y, slot.RealAt(kBase + 8)));
     const Real<D> v = hn::MulAdd(v_of_u, uv.x, hn::MulAdd(v_of_v, uv.y, slot.RealAt(kBase + 20)));
-    at.u = hn::IfThenElse(moved, u, at.u);
-    at.v = hn::IfThenElse(moved, v, at.v);
-    at.area = hn::IfThenElse(moved, hn::Abs(u_of_u * v_of_v - u_of_v * v_of_u), at.area);
+    const Real<D> area = hn::Abs(u_of_u * v_of_v - u_of_v * v_of_u);
+    at.u = Choose(
+        d, moved, [&] { return u; }, [&] { return uv.x; });
+    at.v = Choose(
+        d, moved, [&] { return v; }, [&] { return uv.y; });
+    at.area = Choose(
+        d, moved, [&] { return area; }, [&] { return Splat(d, 1); });
   }
   const Real<D> limit = Splat(d, 1e9);  // false for NaN: such a coordinate becomes 0
   at.u = hn::IfThenElseZero(hn::Le(hn::Abs(at.u), limit), at.u);
@@ -220,82 +327,92 @@ HWY_INLINE Coordinates<D> Transform(D d, const RecordReader<TextureSlot, D>& slo
   return at;
 }
 
-/// Which level to read, and whether its nearest texel is taken alone.
+/// Which level to read, and which lanes take its nearest texel alone.
 template <class D>
 struct Level {
   Real<D> number;
-  Mask<D> nearest;
+  Nearest<D> nearest;
 };
-template <class D>
-HWY_INLINE Level<D> ChooseLevel(D d, Int<D> filter, Real<D> lod, Real<D> last, Real<D> u_level) {
+template <class D, class Field>
+HWY_INLINE Level<D> ChooseLevel(D d, Field filter, Real<D> lod, Real<D> last, Real<D> u_level) {
   const Mask<D> minified = hn::Gt(lod, hn::Zero(d));  // false for NaN
-  const Real<D> bounded = hn::Min(hn::IfThenElseZero(minified, lod), last);
-  const Real<D> low = hn::Floor(bounded);
-  const Real<D> threshold =
-      hn::IfThenElse(HasFlag(d, filter, kFilterMipNearest), Splat(d, 0.5), u_level);
-  const Mask<D> up = hn::Lt(threshold, bounded - low);
-  // The bound matters to inactive lanes, whose u_level may be anything.
-  const Real<D> number = hn::Min(low + hn::IfThenElseZero(up, Splat(d, 1)), last);
-  return {hn::IfThenElse(HasFlag(d, filter, kFilterMipNone), hn::Zero(d), number),
-          hn::Or(hn::And(minified, HasFlag(d, filter, kFilterMinNearest)),
-                 hn::AndNot(minified, HasFlag(d, filter, kFilterMagNearest)))};
+  const auto by_footprint = [&] {
+    const Real<D> bounded = hn::Min(hn::IfThenElseZero(minified, lod), last);
+    const Real<D> low = hn::Floor(bounded);
+    const Real<D> threshold = Choose(
+        d, HasFlag(d, filter, kFilterMipNearest), [&] { return Splat(d, 0.5); },
+        [&] { return u_level; });
+    const Mask<D> up = hn::Lt(threshold, bounded - low);
+    // The bound matters to inactive lanes, whose u_level may be anything.
+    return hn::Min(low + hn::IfThenElseZero(up, Splat(d, 1)), last);
+  };
+  const Real<D> number = Choose(
+      d, HasFlag(d, filter, kFilterMipNone), [&] { return hn::Zero(d); }, by_footprint);
+
+  const auto small = HasFlag(d, filter, kFilterMinNearest);
+  const auto large = HasFlag(d, filter, kFilterMagNearest);
+  if (!Any(d, small) && !Any(d, large)) return {number, {minified, false}};  // mask unused
+  const auto one = [&] { return Splat(d, 1); };
+  const auto zero = [&] { return hn::Zero(d); };
+  const Real<D> nearest =
+      hn::IfThenElse(minified, Choose(d, small, one, zero), Choose(d, large, one, zero));
+  const Mask<D> mask = hn::Gt(nearest, hn::Zero(d));
+  return {number, {mask, !hn::AllFalse(d, mask)}};
 }
 
-/// The four texels around a point, blended; only the nearest one is read if no lane wants more.
-template <class D>
-HWY_INLINE Rgba<D> Filter(D d, const TextureTablesView& t, const Encoding<D>& encoding,
+/// The four texels around a point, blended; only the nearest one is read if no lane wants more. All
+/// are fetched before any is decoded, so that their cache misses overlap.
+template <class D, class Condition>
+HWY_INLINE Rgba<D> Filter(D d, const TextureTablesView& t, const Encoding<D, Condition>& encoding,
                           Int<D> offset, Int<D> width, const Axis<D>& x, const Axis<D>& y,
-                          Mask<D> linear) {
+                          bool nearest_only) {
+  const auto fetch = [&](Int<D> texel) { return FetchTexel(d, t, encoding, offset, texel); };
+  const auto decode = [&](const TexelWords<D>& words) {
+    return DecodeTexel(d, t, encoding, words);
+  };
   const Int<D> top = y.low * width;
-  const Rgba<D> top_left = FetchTexel(d, t, encoding, offset, top + x.low);
-  if (hn::AllFalse(d, linear)) return top_left;
+  const TexelWords<D> top_left = fetch(top + x.low);
+  if (nearest_only) return decode(top_left);
   const Int<D> bottom = y.high * width;
-  const Rgba<D> top_right = FetchTexel(d, t, encoding, offset, top + x.high);
-  const Rgba<D> bottom_left = FetchTexel(d, t, encoding, offset, bottom + x.low);
-  const Rgba<D> bottom_right = FetchTexel(d, t, encoding, offset, bottom + x.high);
-  return Lerp(Lerp(top_left, top_right, x.weight), Lerp(bottom_left, bottom_right, x.weight),
-              y.weight);
+  const TexelWords<D> bottom_left = fetch(bottom + x.low);
+  const TexelWords<D> top_right = fetch(top + x.high);
+  const TexelWords<D> bottom_right = fetch(bottom + x.high);
+  return Lerp(Lerp(decode(top_left), decode(top_right), x.weight),
+              Lerp(decode(bottom_left), decode(bottom_right), x.weight), y.weight);
 }
 
-/// The sample of one vector whose `slot` is valid in every lane.
-template <class D>
-HWY_INLINE Rgba<D> Sample(D d, const TextureTablesView& t, const RecordReader<TextureSlot, D>& slot,
+/// The sample of one vector. `slot` and `texture` are records that exist in every lane.
+template <class D, class Slot, class Image>
+HWY_INLINE Rgba<D> Sample(D d, const TextureTablesView& t, const Slot& slot, const Image& texture,
                           Mask<D> active, const Vec2<D>& uv, Real<D> log2_footprint,
                           Real<D> u_level) {
   const IntTag<D> di;
-  const Int<D> id = slot.IntAt(offsetof(TextureSlot, texture));
-  const RecordReader<Texture, D> texture(t.textures, id, t.slots[slot.first()].texture,
-                                         slot.same());
-  const Int<D> filter = slot.IntAt(offsetof(TextureSlot, filter));
-  const Real<D> width0 = hn::ConvertTo(d, texture.IntAt(offsetof(Texture, width)));
-  const Real<D> height0 = hn::ConvertTo(d, texture.IntAt(offsetof(Texture, height)));
-  const Real<D> last = hn::ConvertTo(d, texture.IntAt(offsetof(Texture, levels)) - hn::Set(di, 1));
+  const Real<D> width0 = ToReal(d, texture.IntAt(offsetof(Texture, width)));
+  const Real<D> height0 = ToReal(d, texture.IntAt(offsetof(Texture, height)));
+  const Real<D> last = ToReal(d, texture.IntAt(offsetof(Texture, levels))) - Splat(d, 1);
 
   const Coordinates<D> at = Transform(d, slot, uv);
   const Real<D> area = hn::Max(width0 * height0 * at.area, Splat(d, 1e-30));
   const Real<D> lod = hn::MulAdd(Splat(d, 0.5), FastLog2(d, area), log2_footprint);
-  const Level<D> level = ChooseLevel(d, filter, lod, last, u_level);
+  const Level<D> level =
+      ChooseLevel(d, slot.IntAt(offsetof(TextureSlot, filter)), lod, last, u_level);
 
   // 2^-level by its exponent bits: exact, and free of the per-lane shifts that SSE4 lacks.
   const Int<D> number = hn::ConvertTo(di, level.number);
   const Real<D> shrink = hn::BitCast(d, hn::ShiftLeft<23>(hn::Set(di, 127) - number));
   const Real<D> width = hn::Max(hn::Floor(width0 * shrink), Splat(d, 1));
   const Real<D> height = hn::Max(hn::Floor(height0 * shrink), Splat(d, 1));
-  const Int<D> offset =
-      GatherInt(d, t.textures,
-                id * hn::Set(di, static_cast<int32_t>(sizeof(Texture) / 4)) + number +
-                    hn::Set(di, static_cast<int32_t>(offsetof(Texture, level_offset) / 4)));
+  const Int<D> offset = texture.WordAt(offsetof(Texture, level_offset), number);
 
-  const Int<D> wrap_s = slot.IntAt(offsetof(TextureSlot, wrap_s));
-  const Int<D> wrap_t = slot.IntAt(offsetof(TextureSlot, wrap_t));
-  const Axis<D> x = ResolveAxis(d, WrapUnit(d, at.u, wrap_s), width,
-                                IsEqual(d, wrap_s, kWrapRepeat), level.nearest);
-  const Axis<D> y = ResolveAxis(d, WrapUnit(d, at.v, wrap_t), height,
-                                IsEqual(d, wrap_t, kWrapRepeat), level.nearest);
-  const Encoding<D> encoding = MakeEncoding(d, texture.IntAt(offsetof(Texture, format)),
-                                            texture.IntAt(offsetof(Texture, srgb)));
-  return Filter(d, t, encoding, offset, hn::ConvertTo(di, width), x, y,
-                hn::AndNot(level.nearest, active));
+  const auto encoding = MakeEncoding(d, texture.IntAt(offsetof(Texture, format)),
+                                     texture.IntAt(offsetof(Texture, srgb)));
+  const Axis<D> x =
+      ResolveAxis(d, at.u, slot.IntAt(offsetof(TextureSlot, wrap_s)), width, level.nearest);
+  const Axis<D> y =
+      ResolveAxis(d, at.v, slot.IntAt(offsetof(TextureSlot, wrap_t)), height, level.nearest);
+  const bool nearest_only =
+      level.nearest.any && hn::AllFalse(d, hn::AndNot(level.nearest.mask, active));
+  return Filter(d, t, encoding, offset, hn::ConvertTo(di, width), x, y, nearest_only);
 }
 
 }  // namespace texture_detail
@@ -313,9 +430,16 @@ HWY_NOINLINE Rgba<D> SampleTexture(D d, const TextureTablesView& t, Int<D> slot,
   const int32_t first = hn::ExtractLane(slot, static_cast<size_t>(lane));
   // Inactive lanes read what an active one reads, so that every gather is in range.
   const Int<D> valid = hn::IfThenElse(hn::RebindMask(di, active), slot, hn::Set(di, first));
-  const bool same = hn::AllTrue(di, hn::Eq(valid, hn::Set(di, first)));
-  const texture_detail::RecordReader<TextureSlot, D> reader(t.slots, valid, first, same);
-  return texture_detail::Sample(d, t, reader, active, uv, log2_footprint, u_level);
+  using namespace texture_detail;
+  if (hn::MaxLanes(D()) == 1 || hn::AllTrue(di, hn::Eq(valid, hn::Set(di, first)))) {
+    const TextureSlot& shared = t.slots[first];
+    return Sample(d, t, SharedRecord<TextureSlot, D>(&shared),
+                  SharedRecord<Texture, D>(t.textures + shared.texture), active, uv, log2_footprint,
+                  u_level);
+  }
+  const LaneRecords<TextureSlot, D> slots(t.slots, valid);
+  const LaneRecords<Texture, D> textures(t.textures, slots.IntAt(offsetof(TextureSlot, texture)));
+  return Sample(d, t, slots, textures, active, uv, log2_footprint, u_level);
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

@@ -8,6 +8,7 @@
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -86,6 +87,20 @@ TEST(Exr, TheSamePlanesGiveTheSameBytes) {
   other.r[5] += 1;
   WriteExr(folder / "b.exr", kWidth, kHeight, other.Views(), other.attributes);
   EXPECT_NE(ReadBytes(folder / "a.exr"), ReadBytes(folder / "b.exr"));
+}
+
+TEST(Exr, LongNamesAndAllSizesOfTheLastChunkAreRead) {
+  const std::string name(100, 'n');
+  for (int height = 1; height <= 33; ++height) {
+    const TemporaryFolder folder;
+    const std::vector<float> plane(static_cast<size_t>(5 * height), 0.25f);
+    const std::array<ExrChannelView, 1> views = {{{name, std::span<const float>(plane)}}};
+    WriteExr(folder / "a.exr", 5, height, views, {{name, 3}});
+    const ExrImage image = ReadExr(folder / "a.exr");
+    ASSERT_NE(image.FindFloats(name), nullptr);
+    EXPECT_EQ(*image.FindFloats(name), plane) << height;
+    EXPECT_EQ(image.attributes, (ExrAttributes{{name, 3}}));
+  }
 }
 
 TEST(Exr, MistakesOfTheCallerAreNamed) {
