@@ -18,7 +18,7 @@ RandomGraph::RandomGraph(const Shape& shape)
     const auto bins = static_cast<std::uint32_t>(1 + dice % shape.most_bins);
     const bool narrow = shape.explicit_weights && s + 1 == shape.stages;
     bins_.push_back(bins);
-    stages_.push_back(graph_.add_stage<Item>({.name = "s" + std::to_string(s),
+    stages_.push_back(graph_.add_stage<Item>({.name = std::string("s").append(std::to_string(s)),
                                               .bins = bins,
                                               .block_items = shape.block_items,
                                               .lanes = 8,
@@ -35,7 +35,7 @@ RandomGraph::RandomGraph(const Shape& shape)
   }
   for (std::uint32_t i = 0; i < shape.sources; ++i) {
     const auto source =
-        graph_.add_source({.name = "source" + std::to_string(i),
+        graph_.add_source({.name = std::string("source").append(std::to_string(i)),
                            .fan_out = shape.fan_out,
                            .concurrency = shape.source_concurrency,
                            .burst = 256},
