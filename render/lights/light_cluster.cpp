@@ -31,9 +31,8 @@ bool TurnTowards(Point3& axis, const Point3& to, double cos, double angle) {
   for (int i = 0; i < 3; ++i) side[i] = to[i] - cos * axis[i];
   const double length = std::sqrt(Dot(side, side));
   if (!(length > 1e-9)) return false;
-  for (int i = 0; i < 3; ++i) {
-    axis[i] = std::cos(angle) * axis[i] + std::sin(angle) * (side[i] / length);
-  }
+  const double along = std::cos(angle), across = std::sin(angle) / length;
+  for (int i = 0; i < 3; ++i) axis[i] = along * axis[i] + across * side[i];
   const double norm = std::sqrt(Dot(axis, axis));
   for (double& c : axis) c /= norm;
   return true;

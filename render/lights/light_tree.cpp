@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "render/base/error.h"
 #include "render/lights/environment.h"
 #include "render/lights/light_cluster.h"
 #include "render/lights/split.h"
@@ -21,7 +22,8 @@ using stages::LightNode;
 using stages::LightType;
 
 constexpr double kPi = std::numbers::pi;
-constexpr size_t kParallelAbove = 4096;  // lights of a subtree that is worth a task
+constexpr size_t kParallelAbove = 4096;                // lights of a subtree that is worth a task
+constexpr size_t kMostLights = (size_t{1} << 26) - 1;  // a kernel's 32-bit index counts their words
 constexpr int kDeep = 32;  // past this depth halves are equal: depth stays below 32 + log2(n)
 
 Point3 Wide(const float p[3]) {
@@ -252,6 +254,11 @@ void ChooseProbabilities(stages::LightTables& tables, double tree, double infini
 
 void BuildLightTree(stages::SceneTables& scene, std::span<const TriangleEmission> triangles,
                     std::span<const PunctualInput> punctual) {
+  if (triangles.size() + punctual.size() > kMostLights) {
+    throw InputError("the scene",
+                     "has more than 67,108,863 lights and emissive triangles; "
+                     "make fewer materials emissive");
+  }
   stages::LightTables& tables = scene.lights;
   tables.lights.clear();
   tables.nodes.clear();

@@ -78,6 +78,7 @@ size_t SplitInHalves(std::span<LightCluster> lights, const Extent& e) {
 }  // namespace
 
 size_t SplitLights(std::span<LightCluster> lights, bool deep) {
+  if (lights.size() == 2) return 1;
   const Extent e = CentersOf(lights);
   Split best;
   for (int axis = 0; axis < 3 && !deep; ++axis) {
