@@ -22,9 +22,10 @@ Buffer LoadBuffer(Document& document, int index, std::optional<std::span<const s
   const std::string pointer = Pointer("buffers", index);
   Buffer buffer;
   if (json.contains("uri")) {
-    buffer.bytes = LoadUri(document, json["uri"], document.Where(pointer + "/uri"), length);
+    buffer.owned = LoadUri(document, json["uri"], document.Where(pointer + "/uri"), length);
+    buffer.bytes = buffer.owned;
   } else if (index == 0 && binary) {
-    buffer.bytes.assign(binary->begin(), binary->end());
+    buffer.bytes = *binary;
   } else {
     return buffer;
   }
@@ -33,7 +34,7 @@ Buffer LoadBuffer(Document& document, int index, std::optional<std::span<const s
                                                " of its " + std::to_string(length) +
                                                " bytes; copy or export the file again");
   }
-  buffer.bytes.resize(length);
+  buffer.bytes = buffer.bytes.first(length);
   buffer.present = true;
   return buffer;
 }
@@ -86,7 +87,7 @@ std::span<const std::byte> BufferViewBytes(const Document& document, int view) {
                       ") lie outside the buffer's " + std::to_string(buffer.bytes.size()) +
                       "; export the file again");
   }
-  return std::span(buffer.bytes).subspan(offset, length);
+  return buffer.bytes.subspan(offset, length);
 }
 
 std::vector<EncodedImage> LoadImages(Document& document, const std::vector<bool>& used) {

@@ -60,9 +60,12 @@ Document OpenDocument(const std::filesystem::path& path, const LoadOptions& opti
   document.name = path.string();
   document.folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
   document.options = options;
-  document.budget.left = options.max_file_bytes;
-  const std::vector<std::byte> file = ReadFile(path, document.name, document.budget);
-  const Container container = SplitContainer(file, document.name);
+  for (uint64_t* limit : {&document.options.max_file_bytes, &document.options.max_geometry_bytes}) {
+    if (*limit == 0) *limit = HalfOfMemory();
+  }
+  document.budget.left = document.options.max_file_bytes;
+  document.file = ReadFile(path, document.name, document.budget);
+  const Container container = SplitContainer(document.file, document.name);
   document.json = ParseJson(container.json, document.name);
   CheckSchema(document);
   CheckVersion(document);

@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,10 +18,12 @@ namespace carpool::render::gltf {
 
 using Json = nlohmann::json;
 
-/// One buffer of the file. `present` is false where the file gives it no data (only extensions that
-/// are not read could); touching such a buffer is an error.
+/// One buffer of the file; `bytes` lies in `owned` or in the file's BIN chunk. `present` is false
+/// where the file gives it no data (only extensions that are not read could); touching such a
+/// buffer is an error.
 struct Buffer {
-  std::vector<std::byte> bytes;
+  std::vector<std::byte> owned;
+  std::span<const std::byte> bytes;
   bool present = false;
 };
 
@@ -29,8 +33,9 @@ struct Buffer {
 struct Document {
   std::string name;              // the path as the user gave it, opens every message
   std::filesystem::path folder;  // URIs are relative to it
-  LoadOptions options;
+  LoadOptions options;           // with limits of 0 replaced
   ByteBudget budget;
+  std::vector<std::byte> file;  // the scene file itself, kept for its BIN chunk
   Json json;
   std::vector<Buffer> buffers;
   std::set<std::string> warned;

@@ -11,11 +11,20 @@ namespace carpool::render::gltf {
 
 void ByteBudget::Take(uint64_t bytes, const std::string& where) {
   if (bytes > left) {
-    throw InputError(where,
-                     "the scene's files hold more bytes than the limit allows; "
-                     "raise the limit or make the scene smaller");
+    throw InputError(where, "the scene's files hold more bytes than the limit of " +
+                                std::to_string((left + taken) >> 20) +
+                                " MiB allows; use smaller textures or split the scene");
   }
   left -= bytes;
+  taken += bytes;
+}
+
+uint64_t HalfOfMemory() {
+  std::ifstream stream("/proc/meminfo");
+  std::string label;
+  uint64_t kib = 0;
+  if (stream >> label >> kib && label == "MemTotal:" && kib > 0) return kib * 512;
+  return uint64_t{4} << 30;
 }
 
 std::vector<std::byte> ReadFile(const std::filesystem::path& path, const std::string& where,

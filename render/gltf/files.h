@@ -14,10 +14,14 @@ namespace carpool::render::gltf {
 /// adds up.
 struct ByteBudget {
   uint64_t left = std::numeric_limits<uint64_t>::max();
+  uint64_t taken = 0;
 
   /// Take() subtracts, or throws InputError where less is left.
   void Take(uint64_t bytes, const std::string& where);
 };
+
+/// HalfOfMemory() is half of what this machine has, in bytes; 4 GiB where it does not say.
+uint64_t HalfOfMemory();
 
 /// ReadFile() reads the first `at_most` bytes of a regular file, all by default.
 std::vector<std::byte> ReadFile(const std::filesystem::path& path, const std::string& where,

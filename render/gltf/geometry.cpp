@@ -133,7 +133,7 @@ void GeometryBuilder::Charge(uint64_t bytes) {
     throw InputError(document_.name,
                      "the scene's geometry needs more than the limit of " +
                          std::to_string(document_.options.max_geometry_bytes >> 20) +
-                         " MiB; raise the limit or make the scene smaller");
+                         " MiB; instance its meshes or split it");
   }
 }
 

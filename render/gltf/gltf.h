@@ -23,9 +23,10 @@ struct LoadOptions {
   std::string scene;           // name or index of the scene to draw; empty: the file's default
   WarningSink warn;            // each warning once, one line; empty: silence
 
-  // A file can ask for more than a machine has; what passes these limits is refused, not tried.
-  uint64_t max_file_bytes = uint64_t{16} << 30;     // of all files and data: URIs together
-  uint64_t max_geometry_bytes = uint64_t{8} << 30;  // of vertex streams, indices and instances
+  // A file can ask for more than a machine has; what passes these limits is refused, not tried. 0
+  // is half of the machine's memory.
+  uint64_t max_file_bytes = 0;      // of all files and data: URIs together
+  uint64_t max_geometry_bytes = 0;  // of vertex streams, indices and instances
 };
 
 /// One image as stored. `bytes` is empty where no supported material uses the image.
