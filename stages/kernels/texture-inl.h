@@ -56,11 +56,11 @@ template <class D>
 HWY_INLINE Mask<D> HasFlag(D d, Int<D> flags, int32_t flag) {
   return Test(d, hn::And(flags, hn::Set(IntTag<D>(), flag)), flag);
 }
-HWY_INLINE bool Not(bool a) {
+HWY_INLINE bool Inverse(bool a) {
   return !a;
 }
 template <class M>
-HWY_INLINE M Not(M a) {
+HWY_INLINE M Inverse(M a) {
   return hn::Not(a);
 }
 HWY_INLINE bool Both(bool a, bool b) {
@@ -222,7 +222,7 @@ HWY_INLINE auto MakeEncoding(D d, Field format, Field srgb_flag) {
   const auto wide = Test(d, format, static_cast<int32_t>(TexelFormat::rgba16));
   const Real<D> scale = Choose(
       d, wide, [&] { return Splat(d, 1.0 / 65535); }, [&] { return Splat(d, 1.0 / 255); });
-  return Encoding<D, decltype(wide)>{wide, Not(Test(d, srgb_flag, 0)), scale};
+  return Encoding<D, decltype(wide)>{wide, Inverse(Test(d, srgb_flag, 0)), scale};
 }
 
 /// Linear light of `code` where `condition` holds, else `value`; codes elsewhere may exceed the
@@ -241,7 +241,7 @@ template <class D, class Condition>
 HWY_INLINE Real<D> DecodeColor(D d, const TextureTablesView& t,
                                const Encoding<D, Condition>& encoding, Int<D> code) {
   Real<D> value = hn::ConvertTo(d, code) * encoding.scale;
-  const Condition srgb8 = Both(Not(encoding.wide), encoding.srgb);
+  const Condition srgb8 = Both(Inverse(encoding.wide), encoding.srgb);
   if (Any(d, srgb8)) value = LookUp(d, t.srgb8, srgb8, code, value);
   const Condition srgb16 = Both(encoding.wide, encoding.srgb);
   if (Any(d, srgb16)) value = LookUp(d, t.srgb16, srgb16, code, value);
@@ -305,7 +305,7 @@ struct Coordinates {
 };
 template <class D, class Slot>
 HWY_INLINE Coordinates<D> Transform(D d, const Slot& slot, const Vec2<D>& uv) {
-  const auto moved = Not(Test(d, slot.IntAt(offsetof(TextureSlot, has_transform)), 0));
+  const auto moved = Inverse(Test(d, slot.IntAt(offsetof(TextureSlot, has_transform)), 0));
   Coordinates<D> at{uv.x, uv.y, Splat(d, 1)};
   if (Any(d, moved)) {
     constexpr size_t kBase = offsetof(TextureSlot, transform);
