@@ -47,6 +47,7 @@ class Workspace {
   const PreparedScene& scene() const { return scene_; }
   const Plan& plan() const { return plan_; }
   const stages::Kernels& kernels() const { return kernels_; }
+  const stages::KernelContext& context() const { return context_; }
   const stages::FilmAccumulator& film() const { return film_; }
   stages::Executor& executor() { return *executor_; }
   const std::string& executor_reason() const { return executor_reason_; }
