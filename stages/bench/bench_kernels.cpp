@@ -33,7 +33,18 @@ struct Work {
   std::vector<float> in[20];
   std::vector<float> out[8];
 };
-enum Column { kBase = 0, kMetallic = 3, kRoughness, kIor, kSpecular, kSpecularColor = 7, kWo = 10, kLobe = 13, kU = 14, kWi = 16 };
+enum Column {
+  kBase = 0,
+  kMetallic = 3,
+  kRoughness,
+  kIor,
+  kSpecular,
+  kSpecularColor = 7,
+  kWo = 10,
+  kLobe = 13,
+  kU = 14,
+  kWi = 16
+};
 
 /// One kernel, three ways, on one target.
 struct Contest {
@@ -68,7 +79,8 @@ void LaneSampler(Work& w) {
   const D d;
   const WordTag<D> dw;
   for (size_t i = 0; i < kItems; i += hn::Lanes(d)) {
-    const SampleKey<D> key = MakeSampleKey(d, hn::LoadU(dw, &w.pixel[i]), hn::LoadU(dw, &w.sample[i]), 0);
+    const SampleKey<D> key =
+        MakeSampleKey(d, hn::LoadU(dw, &w.pixel[i]), hn::LoadU(dw, &w.sample[i]), 0);
     const Word<D> vertex = hn::LoadU(dw, &w.vertex[i]);
     const Vec2<D> a = Sample2D(d, key, vertex, Purpose::bsdf);
     const Vec2<D> b = Sample2D(d, key, vertex, Purpose::light_point);
@@ -79,7 +91,11 @@ void LaneSampler(Work& w) {
 
 plain::Params PlainParams(const Work& w, size_t i) {
   return {{w.in[kBase][i], w.in[kBase + 1][i], w.in[kBase + 2][i]},
-          w.in[kMetallic][i], w.in[kRoughness][i], w.in[kIor][i], false, w.in[kSpecular][i],
+          w.in[kMetallic][i],
+          w.in[kRoughness][i],
+          w.in[kIor][i],
+          false,
+          w.in[kSpecular][i],
           {w.in[kSpecularColor][i], w.in[kSpecularColor + 1][i], w.in[kSpecularColor + 2][i]}};
 }
 plain::Float3 PlainVector(const Work& w, int column, size_t i) {
@@ -88,12 +104,14 @@ plain::Float3 PlainVector(const Work& w, int column, size_t i) {
 
 template <class D>
 Vec3<D> LaneVector(D d, const Work& w, int column, size_t i) {
-  return {hn::LoadU(d, &w.in[column][i]), hn::LoadU(d, &w.in[column + 1][i]), hn::LoadU(d, &w.in[column + 2][i])};
+  return {hn::LoadU(d, &w.in[column][i]), hn::LoadU(d, &w.in[column + 1][i]),
+          hn::LoadU(d, &w.in[column + 2][i])};
 }
 template <class D>
 SurfaceParams<D> LaneParams(D d, const Work& w, size_t i) {
-  return {LaneVector(d, w, kBase, i), hn::LoadU(d, &w.in[kMetallic][i]), hn::LoadU(d, &w.in[kRoughness][i]),
-          hn::LoadU(d, &w.in[kIor][i]), hn::Lt(hn::Zero(d), hn::Zero(d)), hn::LoadU(d, &w.in[kSpecular][i]),
+  return {LaneVector(d, w, kBase, i),         hn::LoadU(d, &w.in[kMetallic][i]),
+          hn::LoadU(d, &w.in[kRoughness][i]), hn::LoadU(d, &w.in[kIor][i]),
+          hn::Lt(hn::Zero(d), hn::Zero(d)),   hn::LoadU(d, &w.in[kSpecular][i]),
           LaneVector(d, w, kSpecularColor, i)};
 }
 
@@ -104,7 +122,8 @@ void PlainBsdf(Work& w) {
     const plain::Float3 wo = PlainVector(w, kWo, i);
     const plain::Surface s = plain::Prepare(tables, PlainParams(w, i), wo);
     const plain::Value v = plain::Evaluate(s, wo, PlainVector(w, kWi, i));
-    const plain::Sampled next = plain::SampleSurface(s, wo, w.in[kLobe][i], {w.in[kU][i], w.in[kU + 1][i]});
+    const plain::Sampled next =
+        plain::SampleSurface(s, wo, w.in[kLobe][i], {w.in[kU][i], w.in[kU + 1][i]});
     w.out[0][i] = v.f_cos.x + v.f_cos.y + v.f_cos.z + v.pdf;
     w.out[1][i] = next.wi.x + next.wi.y + next.wi.z;
     w.out[2][i] = next.weight.x + next.weight.y + next.weight.z + next.pdf;
@@ -160,7 +179,8 @@ Work MakeWork() {
     // As in scenes: half the surfaces are dielectric, most others metal.
     w.in[kMetallic][i] = i % 2 == 0 ? 0.0f : i % 8 == 1 ? 0.5f : 1.0f;
     for (const int column : {kWo, kWi}) {
-      const float z = 0.02f + 0.98f * uniform(), sine = std::sqrt(1 - z * z), angle = 6.2831853f * uniform();
+      const float z = 0.02f + 0.98f * uniform(), sine = std::sqrt(1 - z * z),
+                  angle = 6.2831853f * uniform();
       w.in[column][i] = sine * std::cos(angle);
       w.in[column + 1][i] = sine * std::sin(angle);
       w.in[column + 2][i] = z;
@@ -173,7 +193,9 @@ Work MakeWork() {
 double TimePass(void (*run)(Work&), Work& w) {
   const auto start = std::chrono::steady_clock::now();
   run(w);
-  return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count() / kItems;
+  return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start)
+             .count() /
+         kItems;
 }
 
 double Median(std::vector<double> values) {
@@ -187,7 +209,8 @@ struct Row {
   double target;  // 0: none; ratios of one lane must stay below it
 };
 
-/// Largest difference of results between the ways; they take the same branches, so only rounding differs.
+/// Largest difference of results between the ways; they take the same branches, so only rounding
+/// differs.
 double Disagreement(const Work& a, const Work& b) {
   size_t apart = 0;
   for (int c = 0; c < 3; ++c) {
@@ -207,7 +230,8 @@ void RunContest(const Contest& contest, const std::string& target, std::vector<R
   constexpr int kRounds = 301;
   std::vector<double> times[3], one_over_plain, one_over_wide;
   for (int round = 0; round < kRounds; ++round) {
-    const double plain = TimePass(contest.plain, w), one = TimePass(contest.one, w), wide = TimePass(contest.wide, w);
+    const double plain = TimePass(contest.plain, w), one = TimePass(contest.one, w),
+                 wide = TimePass(contest.wide, w);
     times[0].push_back(plain), times[1].push_back(one), times[2].push_back(wide);
     one_over_plain.push_back(one / plain);
     one_over_wide.push_back(one / wide);
@@ -239,11 +263,13 @@ bool WriteJson(const std::vector<Row>& rows, const char* path) {
   std::fprintf(file, "[\n");
   for (size_t i = 0; i < rows.size(); ++i) {
     const Row& row = rows[i];
-    std::fprintf(file, "  {\"name\": \"%s\", \"value\": %.6g, \"unit\": \"%s\", ", row.name.c_str(), row.value, row.unit.c_str());
+    std::fprintf(file, "  {\"name\": \"%s\", \"value\": %.6g, \"unit\": \"%s\", ", row.name.c_str(),
+                 row.value, row.unit.c_str());
     if (row.target == 0) {
       std::fprintf(file, "\"target\": null, \"holds\": null}");
     } else {
-      std::fprintf(file, "\"target\": %.6g, \"holds\": %s}", row.target, row.value <= row.target ? "true" : "false");
+      std::fprintf(file, "\"target\": %.6g, \"holds\": %s}", row.target,
+                   row.value <= row.target ? "true" : "false");
     }
     std::fprintf(file, "%s\n", i + 1 < rows.size() ? "," : "");
   }
@@ -255,7 +281,8 @@ std::vector<Row> RunAll() {
   std::vector<Row> rows;
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
     hwy::SetSupportedTargetsForTest(target);
-    for (const Contest& contest : HWY_DYNAMIC_DISPATCH(KernelContests)()) RunContest(contest, hwy::TargetName(target), rows);
+    for (const Contest& contest : HWY_DYNAMIC_DISPATCH(KernelContests)())
+      RunContest(contest, hwy::TargetName(target), rows);
   }
   hwy::SetSupportedTargetsForTest(0);
   return rows;

@@ -1,7 +1,9 @@
-// The sampler and the BSDF as one would write them in plain scalar C++: what one-lane kernels are held to.
+// The sampler and the BSDF as one would write them in plain scalar C++: what one-lane kernels are
+// held to.
 //
-// Same formulas and tables as stages/sampling and stages/kernels, with branches where a scalar program
-// branches. It is compiled once per SIMD target, so that both sides may use the same instructions.
+// Same formulas and tables as stages/sampling and stages/kernels, with branches where a scalar
+// program branches. It is compiled once per SIMD target, so that both sides may use the same
+// instructions.
 
 #if defined(CARPOOL_STAGES_BENCH_PLAIN_KERNELS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARPOOL_STAGES_BENCH_PLAIN_KERNELS_INL_H_
@@ -68,7 +70,9 @@ inline uint32_t SecondSobol(uint32_t x) {
   x ^= (x >> 2) & 0x33333333u;
   return x ^ ((x >> 1) & 0x55555555u);
 }
-inline float Unit(uint32_t word) { return static_cast<float>(static_cast<int32_t>(word >> 8)) * 0x1p-24f; }
+inline float Unit(uint32_t word) {
+  return static_cast<float>(static_cast<int32_t>(word >> 8)) * 0x1p-24f;
+}
 inline uint32_t Derive(uint32_t hash, uint32_t odd) {
   const uint32_t x = hash * odd;
   return x ^ (x >> 16);
@@ -77,7 +81,8 @@ inline Key MakeKey(uint32_t pixel, uint32_t sample, uint32_t seed_hash) {
   return {Mix(Mix(pixel + seed_hash) + (sample & 3) * 0x9e3779b9u), Reverse(sample >> 2)};
 }
 inline Float2 Sample2(const Key& key, uint32_t vertex, Purpose purpose) {
-  const uint32_t hash = Mix(key.seed + (vertex * kPurposesPerVertex + static_cast<uint32_t>(purpose)) * 0x9e3779b9u);
+  const uint32_t hash =
+      Mix(key.seed + (vertex * kPurposesPerVertex + static_cast<uint32_t>(purpose)) * 0x9e3779b9u);
   const uint32_t index = Reverse(Scramble(key.reversed_index, hash));
   return {Unit(Reverse(Scramble(index, Derive(hash, 0x85ebca6bu)))),
           Unit(Reverse(Scramble(SecondSobol(index), Derive(hash, 0xc2b2ae35u))))};
@@ -88,16 +93,36 @@ inline Float2 Sample2(const Key& key, uint32_t vertex, Purpose purpose) {
 struct Float3 {
   float x, y, z;
 };
-inline Float3 operator+(Float3 a, Float3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Float3 operator*(Float3 a, float s) { return {a.x * s, a.y * s, a.z * s}; }
-inline Float3 FmaEach(Float3 a, float s, Float3 b) { return {Fma(a.x, s, b.x), Fma(a.y, s, b.y), Fma(a.z, s, b.z)}; }
-inline float Dot(Float3 a, Float3 b) { return Fma(a.x, b.x, Fma(a.y, b.y, a.z * b.z)); }
-inline float Sum(Float3 a) { return a.x + a.y + a.z; }
-inline float Largest(Float3 a) { return std::max(a.x, std::max(a.y, a.z)); }
-inline float Clamp(float x) { return std::min(std::max(x, 0.0f), 1.0f); }
-inline Float3 Clamp(Float3 c) { return {Clamp(c.x), Clamp(c.y), Clamp(c.z)}; }
-inline float Divide(float a, float b) { return b > 0 ? a / b : 0; }
-inline float Mixed(float t, float a, float b) { return Fma(t, b - a, a); }
+inline Float3 operator+(Float3 a, Float3 b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+inline Float3 operator*(Float3 a, float s) {
+  return {a.x * s, a.y * s, a.z * s};
+}
+inline Float3 FmaEach(Float3 a, float s, Float3 b) {
+  return {Fma(a.x, s, b.x), Fma(a.y, s, b.y), Fma(a.z, s, b.z)};
+}
+inline float Dot(Float3 a, Float3 b) {
+  return Fma(a.x, b.x, Fma(a.y, b.y, a.z * b.z));
+}
+inline float Sum(Float3 a) {
+  return a.x + a.y + a.z;
+}
+inline float Largest(Float3 a) {
+  return std::max(a.x, std::max(a.y, a.z));
+}
+inline float Clamp(float x) {
+  return std::min(std::max(x, 0.0f), 1.0f);
+}
+inline Float3 Clamp(Float3 c) {
+  return {Clamp(c.x), Clamp(c.y), Clamp(c.z)};
+}
+inline float Divide(float a, float b) {
+  return b > 0 ? a / b : 0;
+}
+inline float Mixed(float t, float a, float b) {
+  return Fma(t, b - a, a);
+}
 
 struct Params {
   Float3 base;
@@ -139,7 +164,9 @@ inline Row FindRow(const BsdfTablesView& tables, float roughness) {
   const int k = std::min(static_cast<int>(knot), kAverageRoughnesses - 2);
   const float t = knot - static_cast<float>(k);
   const float* at = tables.average + k * kAverageColumns;
-  return {r * r, position - static_cast<float>(row), row * kAlbedoCosines,
+  return {r * r,
+          position - static_cast<float>(row),
+          row * kAlbedoCosines,
           {Mixed(t, at[0], at[kAverageColumns]), Mixed(t, at[1], at[kAverageColumns + 1])},
           Mixed(t, at[2], at[kAverageColumns + 2])};
 }
@@ -147,12 +174,15 @@ inline Row FindRow(const BsdfTablesView& tables, float roughness) {
 inline Pair LookUpPair(const BsdfTablesView& tables, const Row& row, float mu) {
   mu = std::min(mu, 1.0f);
   const float follow = std::sqrt(mu * (1 + row.alpha) / (mu + row.alpha));
-  const float position = Fma(follow, static_cast<float>(kAlbedoCoordinateShare * (kAlbedoCosines - 1)),
-                             mu * static_cast<float>((1 - kAlbedoCoordinateShare) * (kAlbedoCosines - 1)));
+  const float position =
+      Fma(follow, static_cast<float>(kAlbedoCoordinateShare * (kAlbedoCosines - 1)),
+          mu * static_cast<float>((1 - kAlbedoCoordinateShare) * (kAlbedoCosines - 1)));
   const int column = std::min(static_cast<int>(position), kAlbedoCosines - 2);
   const float t = position - static_cast<float>(column);
   const int32_t* at = tables.albedo + row.base + column;
-  const auto upper = [](int32_t w) { return static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(w) >> 16)); };
+  const auto upper = [](int32_t w) {
+    return static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(w) >> 16));
+  };
   const auto lower = [](int32_t w) { return static_cast<float>(w & 0xffff); };
   const float m = Mixed(row.fraction, Mixed(t, upper(at[0]), upper(at[1])),
                         Mixed(t, upper(at[kAlbedoCosines]), upper(at[kAlbedoCosines + 1]))) *
@@ -189,13 +219,18 @@ inline Float2 CosSin(float turns) {
   return quadrant & 2 ? Float2{-x, -y} : Float2{x, y};
 }
 
-inline float Root(Float3 w, float alpha) { return std::sqrt(Fma(alpha * alpha, Fma(w.x, w.x, w.y * w.y), w.z * w.z)); }
-inline Float3 Normal(Float3 v) { return v * (1 / std::sqrt(Dot(v, v))); }
+inline float Root(Float3 w, float alpha) {
+  return std::sqrt(Fma(alpha * alpha, Fma(w.x, w.x, w.y * w.y), w.z * w.z));
+}
+inline Float3 Normal(Float3 v) {
+  return v * (1 / std::sqrt(Dot(v, v)));
+}
 
 struct Surface {
   BsdfTablesView tables;
   Row row;
-  float inverse_alpha, root_o, pdf_scale, f90, through, through_m, through_b, spread, natural_spread;
+  float inverse_alpha, root_o, pdf_scale, f90, through, through_m, through_b, spread,
+      natural_spread;
   Float3 f0, multi, diffuse;
   float specular_weight, multi_weight, diffuse_weight, total_weight, inverse_total;
 };
@@ -207,7 +242,9 @@ inline float Share(float f0, float f90, float m) {
   const float f = Fma(f90 - f0, 1.0f / 21, f0);
   return f * f * (1 - m) / Fma(-f, m, 1);
 }
-inline Float3 Share(Float3 f0, float f90, float m) { return {Share(f0.x, f90, m), Share(f0.y, f90, m), Share(f0.z, f90, m)}; }
+inline Float3 Share(Float3 f0, float f90, float m) {
+  return {Share(f0.x, f90, m), Share(f0.y, f90, m), Share(f0.z, f90, m)};
+}
 
 inline Surface Prepare(const BsdfTablesView& tables, const Params& p, Float3 wo) {
   Surface s;
@@ -257,13 +294,15 @@ inline Value Evaluate(const Surface& s, Float3 wo, Float3 wi) {
   float pdf = 0;
   if (s.specular_weight > 0) {
     const Float3 half = wo + wi;
-    const float length2 = Dot(half, half), inverse = s.inverse_alpha, x = half.x * inverse, y = half.y * inverse;
+    const float length2 = Dot(half, half), inverse = s.inverse_alpha, x = half.x * inverse,
+                y = half.y * inverse;
     const float ratio = length2 / std::max(Fma(x, x, Fma(y, y, half.z * half.z)), 1e-37f) * inverse;
     const float distribution = ratio * ratio * (1 / kPiF);
     const float joint = Fma(wi.z, s.root_o, wo.z * Root(wi, s.row.alpha));
     const float value = distribution * (0.5f * wi.z / std::max(joint, 1e-37f));
     const float power = SchlickPower(std::sqrt(length2) * 0.5f);
-    const Float3 fresnel{Fma(s.f90 - s.f0.x, power, s.f0.x), Fma(s.f90 - s.f0.y, power, s.f0.y), Fma(s.f90 - s.f0.z, power, s.f0.z)};
+    const Float3 fresnel{Fma(s.f90 - s.f0.x, power, s.f0.x), Fma(s.f90 - s.f0.y, power, s.f0.y),
+                         Fma(s.f90 - s.f0.z, power, s.f0.z)};
     f = fresnel * value;
     pdf = s.specular_weight * s.pdf_scale * distribution;
   }
@@ -288,7 +327,8 @@ inline Float3 SampleSpecular(const Surface& s, Float3 wo, Float2 u) {
   const float whole = 1 + stretched.z, below = u.y * whole, square = below * (2 - below);
   const float sine = square > 0 ? std::sqrt(square) : 0;
   const Float2 turn = CosSin(u.x);
-  const Float3 half{Fma(sine, turn.x, stretched.x), Fma(sine, turn.y, stretched.y), (1 - u.y) * whole};
+  const Float3 half{Fma(sine, turn.x, stretched.x), Fma(sine, turn.y, stretched.y),
+                    (1 - u.y) * whole};
   const Float3 normal = Normal({half.x * alpha, half.y * alpha, half.z});
   const float twice = 2 * Dot(wo, normal);
   return {Fma(normal.x, twice, -wo.x), Fma(normal.y, twice, -wo.y), Fma(normal.z, twice, -wo.z)};
@@ -304,7 +344,8 @@ inline Float3 SampleDiffuse(Float2 u) {
   const bool wide = std::abs(a) > std::abs(b);
   const float r = wide ? a : b, size = std::abs(r);
   const Float2 turn = CosSin((wide ? b : a) / r * 0.125f);
-  return {r * (wide ? turn.x : turn.y), r * (wide ? turn.y : turn.x), std::sqrt((1 - size) * (1 + size))};
+  return {r * (wide ? turn.x : turn.y), r * (wide ? turn.y : turn.x),
+          std::sqrt((1 - size) * (1 + size))};
 }
 
 inline Sampled SampleSurface(const Surface& s, Float3 wo, float u_lobe, Float2 u) {

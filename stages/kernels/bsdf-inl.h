@@ -1,8 +1,8 @@
 // The material model: glTF metallic-roughness with KHR_materials_ior and KHR_materials_specular.
 //
-// Prepare once per vertex, then evaluate and sample. Directions are unit vectors in the local frame,
-// z = shading normal, wo.z > 0. Where this departs from the glTF sample BRDF, stages/README.md says by how
-// much. Per-target header: see stages/simd/lanes-inl.h.
+// Prepare once per vertex, then evaluate and sample. Directions are unit vectors in the local
+// frame, z = shading normal, wo.z > 0. Where this departs from the glTF sample BRDF,
+// stages/README.md says by how much. Per-target header: see stages/simd/lanes-inl.h.
 
 #if defined(CARPOOL_STAGES_KERNELS_BSDF_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARPOOL_STAGES_KERNELS_BSDF_INL_H_
@@ -30,7 +30,8 @@ struct SurfaceParams {
   Vec3<D> specular_color;  // at least 0
 };
 
-/// All lobes, from the top down. A new lobe is a file of its own, named here and set in PrepareBsdf.
+/// All lobes, from the top down. A new lobe is a file of its own, named here and set in
+/// PrepareBsdf.
 template <class D>
 struct Bsdf : LobeSet<D, SpecularLobe, MultiScatterLobe, DiffuseLobe> {
   BsdfTablesView tables;
@@ -47,7 +48,8 @@ struct SchlickTerm {
 template <class D>
 HWY_INLINE Vec3<D> Clamp01(D d, const Vec3<D>& c) {
   const Real<D> zero = hn::Zero(d), one = Splat(d, 1);
-  return {hn::Min(hn::Max(c.x, zero), one), hn::Min(hn::Max(c.y, zero), one), hn::Min(hn::Max(c.z, zero), one)};
+  return {hn::Min(hn::Max(c.x, zero), one), hn::Min(hn::Max(c.y, zero), one),
+          hn::Min(hn::Max(c.z, zero), one)};
 }
 
 /// KHR_materials_specular: f0 = min(f0(ior) color, 1) specular, f90 = specular.
@@ -75,8 +77,8 @@ HWY_INLINE Real<D> SumComponents(const Vec3<D>& c) {
 
 /// GGX is linear in F0 and F90, so one lobe with mixed values is the mixture of two lobes.
 template <class D>
-HWY_INLINE void PrepareSpecular(D d, const SchlickTerm<D>& dielectric, const Vec3<D>& base, Real<D> metallic,
-                                const AlbedoAt<D>& at_wo, SpecularLobe<D>& lobe) {
+HWY_INLINE void PrepareSpecular(D d, const SchlickTerm<D>& dielectric, const Vec3<D>& base,
+                                Real<D> metallic, const AlbedoAt<D>& at_wo, SpecularLobe<D>& lobe) {
   const Real<D> one = Splat(d, 1);
   lobe.f0 = MulAdd<D>(Sub<D>(base, dielectric.f0), metallic, dielectric.f0);
   lobe.f90 = hn::MulAdd(one - dielectric.f90, metallic, dielectric.f90);
@@ -85,8 +87,9 @@ HWY_INLINE void PrepareSpecular(D d, const SchlickTerm<D>& dielectric, const Vec
 }
 
 template <class D>
-HWY_INLINE void PrepareMultiScatter(D d, const Vec3<D>& dielectric_share, const Vec3<D>& base, Real<D> metallic,
-                                    const AlbedoAt<D>& at_wo, const AlbedoRow<D>& row, MultiScatterLobe<D>& lobe) {
+HWY_INLINE void PrepareMultiScatter(D d, const Vec3<D>& dielectric_share, const Vec3<D>& base,
+                                    Real<D> metallic, const AlbedoAt<D>& at_wo,
+                                    const AlbedoRow<D>& row, MultiScatterLobe<D>& lobe) {
   Vec3<D> share = Scale<D>(dielectric_share, Splat(d, 1) - metallic);
   if (!hn::AllFalse(d, hn::Gt(metallic, hn::Zero(d)))) {
     const SchlickTerm<D> metal{base, Splat(d, 1)};
@@ -99,9 +102,10 @@ HWY_INLINE void PrepareMultiScatter(D d, const Vec3<D>& dielectric_share, const 
 
 /// 1 - E, with the brightest channel's E for all channels, as KHR_materials_specular has it.
 template <class D>
-HWY_INLINE void PrepareDiffuse(D d, const SchlickTerm<D>& dielectric, const Vec3<D>& dielectric_share,
-                               const Vec3<D>& base, Real<D> metallic, const AlbedoAt<D>& at_wo,
-                               const AlbedoRow<D>& row, DiffuseLobe<D>& lobe) {
+HWY_INLINE void PrepareDiffuse(D d, const SchlickTerm<D>& dielectric,
+                               const Vec3<D>& dielectric_share, const Vec3<D>& base,
+                               Real<D> metallic, const AlbedoAt<D>& at_wo, const AlbedoRow<D>& row,
+                               DiffuseLobe<D>& lobe) {
   const Real<D> one = Splat(d, 1);
   const Real<D> f0 = MaxComponent<D>(dielectric.f0);
   lobe.through = one - f0;
@@ -113,7 +117,8 @@ HWY_INLINE void PrepareDiffuse(D d, const SchlickTerm<D>& dielectric, const Vec3
 }
 
 template <class D>
-HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceParams<D>& params, const Vec3<D>& wo) {
+HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceParams<D>& params,
+                               const Vec3<D>& wo) {
   Bsdf<D> bsdf;
   bsdf.tables = tables;
   bsdf.row = FindAlbedoRow<D>(d, tables, params.roughness);
@@ -133,7 +138,8 @@ HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceP
 
 /// f cos and the sampling density of one direction; zero where wi.z <= 0.
 template <class D>
-HWY_INLINE BsdfValue<D> EvaluateBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, const Vec3<D>& wi) {
+HWY_INLINE BsdfValue<D> EvaluateBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo,
+                                     const Vec3<D>& wi) {
   DirectionPair<D> pair = MakePair(d, wo, wi);
   if (hn::AllFalse(d, pair.reflected)) return {Splat3(d, 0, 0, 0), hn::Zero(d)};
   const Real<D> users = bsdf.MultiScatterLobe<D>::weight + bsdf.DiffuseLobe<D>::weight;
@@ -144,7 +150,8 @@ HWY_INLINE BsdfValue<D> EvaluateBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo
 }
 
 template <class D>
-HWY_INLINE BsdfSample<D> SampleBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, Real<D> u_lobe, const Vec2<D>& u) {
+HWY_INLINE BsdfSample<D> SampleBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, Real<D> u_lobe,
+                                    const Vec2<D>& u) {
   const Vec3<D> wi = bsdf.Sample(d, wo, u_lobe, u);
   const BsdfValue<D> value = EvaluateBsdf<D>(d, bsdf, wo, wi);
   const Mask<D> valid = hn::Gt(value.pdf, hn::Zero(d));

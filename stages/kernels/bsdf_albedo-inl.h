@@ -16,8 +16,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
 
-/// M: share of light that leaves a white lobe only after more than one bounce; B: its Schlick-weighted share.
-/// The single-scatter albedo for F0 and F90 is F0 (1 - M - B) + F90 B.
+/// M: share of light that leaves a white lobe only after more than one bounce; B: its
+/// Schlick-weighted share. The single-scatter albedo for F0 and F90 is F0 (1 - M - B) + F90 B.
 template <class D>
 struct AlbedoAt {
   Real<D> m, b;
@@ -27,8 +27,8 @@ struct AlbedoAt {
 template <class D>
 struct AlbedoRow {
   Real<D> alpha;
-  Real<D> fraction;   // towards the next row
-  Index<D> base;      // first cosine of the row
+  Real<D> fraction;     // towards the next row
+  Index<D> base;        // first cosine of the row
   AlbedoAt<D> average;  // cosine-weighted means over the hemisphere
   Real<D> log2_spread;  // see kSpreadPerAlpha2
 };
@@ -72,13 +72,15 @@ HWY_INLINE AlbedoRow<D> FindAlbedoRow(D d, const BsdfTablesView& tables, Real<D>
 
 /// Bilinear look-up at cosine mu >= 0.
 template <class D>
-HWY_INLINE AlbedoAt<D> LookUpAlbedo(D d, const BsdfTablesView& tables, const AlbedoRow<D>& row, Real<D> mu) {
+HWY_INLINE AlbedoAt<D> LookUpAlbedo(D d, const BsdfTablesView& tables, const AlbedoRow<D>& row,
+                                    Real<D> mu) {
   const IndexTag<D> di;
   const Real<D> one = Splat(d, 1);
   mu = hn::Min(mu, one);
   const Real<D> follow = hn::Sqrt(mu * (one + row.alpha) / (mu + row.alpha));
-  const Real<D> position = hn::MulAdd(follow, Splat(d, kAlbedoCoordinateShare * (kAlbedoCosines - 1)),
-                                      mu * Splat(d, (1 - kAlbedoCoordinateShare) * (kAlbedoCosines - 1)));
+  const Real<D> position =
+      hn::MulAdd(follow, Splat(d, kAlbedoCoordinateShare * (kAlbedoCosines - 1)),
+                 mu * Splat(d, (1 - kAlbedoCoordinateShare) * (kAlbedoCosines - 1)));
   const Index<D> column = hn::Min(ToIndex(d, position), hn::Set(di, kAlbedoCosines - 2));
   const Real<D> t = position - FromIndex(d, column);
   const Index<D> at = row.base + column;
@@ -96,8 +98,9 @@ HWY_INLINE AlbedoAt<D> LookUpAlbedo(D d, const BsdfTablesView& tables, const Alb
   return {m, hn::Max(hn::MulAdd(one - m, SchlickWeight(d, mu), c), hn::Zero(d))};
 }
 
-/// Share of Schlick-reflected light that leaves after two or more bounces, of the M that does so for a
-/// white lobe (Kulla and Conty 2017, with the square that makes it start at the second bounce).
+/// Share of Schlick-reflected light that leaves after two or more bounces, of the M that does so
+/// for a white lobe (Kulla and Conty 2017, with the square that makes it start at the second
+/// bounce).
 template <class D>
 HWY_INLINE Real<D> MultiScatterShare(D d, Real<D> average_fresnel, Real<D> average_m) {
   const Real<D> one = Splat(d, 1);

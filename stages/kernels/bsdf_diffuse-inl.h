@@ -1,8 +1,9 @@
 // The diffuse base under a dielectric interface, layered by albedo scaling.
 //
-// f = base / pi (1 - E(wo)) (1 - E(wi)) / (1 - E_avg), E the interface's directional albedo with all its
-// bounces (Kelemen and Szirmay-Kalos 2001): reciprocal, and a white base under any interface returns all
-// light to the tables' residual. Per-target header: see stages/simd/lanes-inl.h.
+// f = base / pi (1 - E(wo)) (1 - E(wi)) / (1 - E_avg), E the interface's directional albedo with
+// all its bounces (Kelemen and Szirmay-Kalos 2001): reciprocal, and a white base under any
+// interface returns all light to the tables' residual. Per-target header: see
+// stages/simd/lanes-inl.h.
 
 #if defined(CARPOOL_STAGES_KERNELS_BSDF_DIFFUSE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARPOOL_STAGES_KERNELS_BSDF_DIFFUSE_INL_H_
@@ -22,10 +23,12 @@ namespace carpool::stages::HWY_NAMESPACE {
 template <class D>
 struct DiffuseLobe {
   Real<D> weight;
-  Vec3<D> diffuse;  // base (1 - E(wo)) / (1 - E_avg)
+  Vec3<D> diffuse;                        // base (1 - E(wo)) / (1 - E_avg)
   Real<D> through, through_m, through_b;  // 1 - E = through - through_m M - through_b B
 
-  HWY_INLINE Vec3<D> Sample(D d, const Vec3<D>&, const Vec2<D>& u) const { return SampleCosineHemisphere(d, u); }
+  HWY_INLINE Vec3<D> Sample(D d, const Vec3<D>&, const Vec2<D>& u) const {
+    return SampleCosineHemisphere(d, u);
+  }
 
   HWY_INLINE void Evaluate(D d, const DirectionPair<D>& pair, LobeSum<D>& sum) const {
     if (hn::AllFalse(d, hn::Gt(weight, hn::Zero(d)))) return;

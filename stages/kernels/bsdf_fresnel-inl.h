@@ -42,16 +42,17 @@ HWY_INLINE Real<D> NormalReflectance(D d, Real<D> ior) {
   return ratio * ratio;
 }
 
-/// F90 of a dielectric: 1 from ior 1.36 up; below, it fades so that the mean of Schlick's term stays within
-/// 0.002 of the exact mean, and so that ior 1 is no interface at all.
+/// F90 of a dielectric: 1 from ior 1.36 up; below, it fades so that the mean of Schlick's term
+/// stays within 0.002 of the exact mean, and so that ior 1 is no interface at all.
 template <class D>
 HWY_INLINE Real<D> DielectricF90(D d, Real<D> ior) {
-  const Real<D> faint = hn::Max(hn::NegMulAdd(ior - Splat(d, 1), Splat(d, 1 / 0.36), Splat(d, 1)), hn::Zero(d));
+  const Real<D> faint =
+      hn::Max(hn::NegMulAdd(ior - Splat(d, 1), Splat(d, 1 / 0.36), Splat(d, 1)), hn::Zero(d));
   return hn::NegMulAdd(faint, faint, Splat(d, 1));
 }
 
-/// Unpolarised reflectance of a dielectric; `eta` is the ior on the far side over the near side's. Total
-/// internal reflection gives 1.
+/// Unpolarised reflectance of a dielectric; `eta` is the ior on the far side over the near side's.
+/// Total internal reflection gives 1.
 template <class D>
 HWY_INLINE Real<D> FresnelDielectric(D d, Real<D> cosine, Real<D> eta) {
   const Real<D> one = Splat(d, 1);
@@ -61,11 +62,13 @@ HWY_INLINE Real<D> FresnelDielectric(D d, Real<D> cosine, Real<D> eta) {
   const Real<D> eta2_cosine = eta * eta * cosine;
   const Real<D> perpendicular = (cosine - g) / (cosine + g);
   const Real<D> parallel = (eta2_cosine - g) / (eta2_cosine + g);
-  const Real<D> mean = Splat(d, 0.5) * hn::MulAdd(perpendicular, perpendicular, parallel * parallel);
+  const Real<D> mean =
+      Splat(d, 0.5) * hn::MulAdd(perpendicular, perpendicular, parallel * parallel);
   return hn::IfThenElse(hn::Gt(refracted2, hn::Zero(d)), mean, one);
 }
 
-/// Unpolarised reflectance of a conductor with complex ior eta + i k (Lagarde 2013, after Born and Wolf).
+/// Unpolarised reflectance of a conductor with complex ior eta + i k (Lagarde 2013, after Born and
+/// Wolf).
 template <class D>
 HWY_INLINE Real<D> FresnelConductor(D d, Real<D> cosine, Real<D> eta, Real<D> k) {
   const Real<D> one = Splat(d, 1);

@@ -4,7 +4,8 @@
 //
 //   Real<D> weight;   its directional albedo at wo, summed over RGB: how often it is sampled
 //   Vec3<D> Sample(d, wo, u)  a direction drawn by this lobe's own density, for lanes that chose it
-//   void Evaluate(d, pair, sum)  adds f cos (times sum.below) and weight x pdf, both zero in lanes whose
+//   void Evaluate(d, pair, sum)  adds f cos (times sum.below) and weight x pdf, both zero in lanes
+//   whose
 //                                pair it does not connect; a covering lobe then scales sum.below
 //
 // A lobe whose weight is zero in a lane must add nothing there.
@@ -67,11 +68,11 @@ struct BsdfSample {
   Vec3<D> wi;
   Vec3<D> weight;  // f cos / pdf
   Real<D> pdf;
-  Mask<D> valid;   // otherwise the path ends: weight and pdf are zero, wi is some unit vector
+  Mask<D> valid;  // otherwise the path ends: weight and pdf are zero, wi is some unit vector
 };
 
-/// The lobes of one material, from the top down. Sampling picks one lobe by weight; the density is always
-/// that of the whole mixture, so that light sampling and BSDF sampling agree on it.
+/// The lobes of one material, from the top down. Sampling picks one lobe by weight; the density is
+/// always that of the whole mixture, so that light sampling and BSDF sampling agree on it.
 template <class D, template <class> class... Lobes>
 struct LobeSet : Lobes<D>... {
   Real<D> total_weight, inverse_total;
@@ -90,8 +91,8 @@ struct LobeSet : Lobes<D>... {
   }
 
   /// A lane's lobe is the first whose running sum of weights exceeds u_lobe times their total. As
-  /// u_lobe <= 1 - 2^-24, the product rounds to less than the total: some lobe of positive weight is
-  /// always chosen, unless all are zero.
+  /// u_lobe <= 1 - 2^-24, the product rounds to less than the total: some lobe of positive weight
+  /// is always chosen, unless all are zero.
   HWY_INLINE Vec3<D> Sample(D d, const Vec3<D>& wo, Real<D> u_lobe, const Vec2<D>& u) const {
     const Real<D> target = u_lobe * total_weight;
     Real<D> running = hn::Zero(d);
@@ -102,8 +103,8 @@ struct LobeSet : Lobes<D>... {
 
  private:
   template <class Lobe>
-  HWY_INLINE void SampleIfChosen(D d, Real<D> target, Real<D>& running, const Vec3<D>& wo, const Vec2<D>& u,
-                                 Vec3<D>& wi) const {
+  HWY_INLINE void SampleIfChosen(D d, Real<D> target, Real<D>& running, const Vec3<D>& wo,
+                                 const Vec2<D>& u, Vec3<D>& wi) const {
     const Real<D> next = running + Lobe::weight;
     const Mask<D> chosen = hn::And(hn::Ge(target, running), hn::Lt(target, next));
     running = next;

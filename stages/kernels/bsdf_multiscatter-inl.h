@@ -1,9 +1,9 @@
 // Light that leaves the GGX lobe after more than one bounce between microfacets.
 //
-// f = share / pi M(wo) M(wi) / M_avg (Kulla and Conty 2017): reciprocal, and it returns exactly what single
-// scattering loses. M lies at mu ~ alpha, where a cosine-weighted direction almost never goes; directions
-// therefore follow mu / (mu^2 + b) with b ~ alpha^2, which bounds f cos / pdf. Per-target header: see
-// stages/simd/lanes-inl.h.
+// f = share / pi M(wo) M(wi) / M_avg (Kulla and Conty 2017): reciprocal, and it returns exactly
+// what single scattering loses. M lies at mu ~ alpha, where a cosine-weighted direction almost
+// never goes; directions therefore follow mu / (mu^2 + b) with b ~ alpha^2, which bounds f cos /
+// pdf. Per-target header: see stages/simd/lanes-inl.h.
 
 #if defined(CARPOOL_STAGES_KERNELS_BSDF_MULTISCATTER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARPOOL_STAGES_KERNELS_BSDF_MULTISCATTER_INL_H_
@@ -28,7 +28,8 @@ struct MultiScatterLobe {
   Real<D> natural_spread;  // log(1 + 1 / b)
   Real<D> spread;          // b
 
-  /// 1 / b from its logarithm by the function that Sample inverts, so that both agree to the last bits.
+  /// 1 / b from its logarithm by the function that Sample inverts, so that both agree to the last
+  /// bits.
   HWY_INLINE void SetSpread(D d, Real<D> log2) {
     log2_spread = log2;
     natural_spread = log2 * Splat(d, std::numbers::ln2);

@@ -38,10 +38,11 @@ struct SpecularLobe {
 
   HWY_INLINE void Evaluate(D d, const DirectionPair<D>& pair, LobeSum<D>& sum) const {
     if (hn::AllFalse(d, hn::Gt(weight, hn::Zero(d)))) return;
-    const Real<D> distribution =
-        hn::IfThenElseZero(pair.reflected, GgxDistribution<D>(d, pair.half, pair.length2, inverse_alpha));
+    const Real<D> distribution = hn::IfThenElseZero(
+        pair.reflected, GgxDistribution<D>(d, pair.half, pair.length2, inverse_alpha));
     const Real<D> root_i = SmithRoot<D>(pair.wi, alpha);
-    const Real<D> value = distribution * sum.below * MicrofacetScale<D>(d, pair.wo, pair.cosine, root_o, root_i);
+    const Real<D> value =
+        distribution * sum.below * MicrofacetScale<D>(d, pair.wo, pair.cosine, root_o, root_i);
     sum.f_cos = MulAdd<D>(SchlickFresnel<D>(d, f0, f90, pair.half_cosine), value, sum.f_cos);
     sum.weighted_pdf = hn::MulAdd(weight * pdf_scale, distribution, sum.weighted_pdf);
   }

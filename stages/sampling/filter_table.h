@@ -10,9 +10,9 @@ namespace carpool::stages {
 constexpr double kPixelFilterRadius = 1.5;
 constexpr int kPixelFilterCells = 256;
 
-/// Knot k is the offset in pixels below which k/256 of the filter's mass lies. Between knots the offset
-/// is linear, so the filter in force is the window averaged over cells of equal mass; that filter is
-/// sampled exactly.
+/// Knot k is the offset in pixels below which k/256 of the filter's mass lies. Between knots the
+/// offset is linear, so the filter in force is the window averaged over cells of equal mass; that
+/// filter is sampled exactly.
 extern const std::array<float, kPixelFilterCells + 1> kPixelFilterKnots;
 
 }  // namespace carpool::stages

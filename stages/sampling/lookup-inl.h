@@ -1,8 +1,8 @@
 // Table look-ups by index for the samplers and BSDF tables, safe at any width.
 //
-// Highway's x86 gathers read all four lanes of a register even when the tag has fewer, so that unused lanes
-// would address memory at random; short tags therefore load scalars. Per-target header: see
-// stages/simd/lanes-inl.h.
+// Highway's x86 gathers read all four lanes of a register even when the tag has fewer, so that
+// unused lanes would address memory at random; short tags therefore load scalars. Per-target
+// header: see stages/simd/lanes-inl.h.
 
 #if defined(CARPOOL_STAGES_SAMPLING_LOOKUP_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef CARPOOL_STAGES_SAMPLING_LOOKUP_INL_H_
@@ -48,7 +48,8 @@ HWY_INLINE Real<D> FromIndex(D d, Index<D> i) {
 
 /// table[index]; every index must be in range.
 template <class DT>
-HWY_INLINE hn::Vec<DT> LookUp(DT dt, const hn::TFromD<DT>* HWY_RESTRICT table, hn::Vec<hn::RebindToSigned<DT>> index) {
+HWY_INLINE hn::Vec<DT> LookUp(DT dt, const hn::TFromD<DT>* HWY_RESTRICT table,
+                              hn::Vec<hn::RebindToSigned<DT>> index) {
   if constexpr (hn::MaxLanes(DT()) == 1) {
     return hn::Set(dt, table[hn::GetLane(index)]);
   } else if constexpr (hn::MaxLanes(DT()) < 4) {

@@ -16,12 +16,13 @@
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
 
-/// (cos, sin) of 2 pi turns, for |turns| up to 2^20: reduced exactly to an eighth of a turn either way, then
-/// Taylor polynomials, whose remainder there is below 2e-9.
+/// (cos, sin) of 2 pi turns, for |turns| up to 2^20: reduced exactly to an eighth of a turn either
+/// way, then Taylor polynomials, whose remainder there is below 2e-9.
 template <class D>
 HWY_INLINE Vec2<D> CosSinTurns(D d, Real<D> turns) {
   const Real<D> quarters = hn::Round(turns * Splat(d, 4));
-  const Real<D> angle = hn::NegMulAdd(quarters, Splat(d, 0.25), turns) * Splat(d, 2 * std::numbers::pi);
+  const Real<D> angle =
+      hn::NegMulAdd(quarters, Splat(d, 0.25), turns) * Splat(d, 2 * std::numbers::pi);
   const Real<D> a2 = angle * angle;
   Real<D> cosine = hn::MulAdd(a2, Splat(d, -1.0 / 3628800), Splat(d, 1.0 / 40320));
   cosine = hn::MulAdd(cosine, a2, Splat(d, -1.0 / 720));
@@ -45,8 +46,8 @@ HWY_INLINE Vec2<D> CosSinTurns(D d, Real<D> turns) {
   return {x * sign, y * sign};
 }
 
-/// 2^n by its exponent bits, for |n| < 127. (Highway's shifts by a variable count are wrong at one lane on
-/// x86: they read the register's unused lanes as part of the count.)
+/// 2^n by its exponent bits, for |n| < 127. (Highway's shifts by a variable count are wrong at one
+/// lane on x86: they read the register's unused lanes as part of the count.)
 template <class D>
 HWY_INLINE Real<D> PowerOfTwo(D d, Index<D> n) {
   const hn::Rebind<float, D> df;
@@ -58,8 +59,8 @@ HWY_INLINE Real<D> PowerOfTwo(D d, Index<D> n) {
   }
 }
 
-/// 2^x - 1 for 0 <= x < 30, to a few units in the last place even where it is tiny: Taylor polynomial about
-/// the nearest integer (remainder below 1e-8).
+/// 2^x - 1 for 0 <= x < 30, to a few units in the last place even where it is tiny: Taylor
+/// polynomial about the nearest integer (remainder below 1e-8).
 template <class D>
 HWY_INLINE Real<D> Exp2Minus1(D d, Real<D> x) {
   const Real<D> whole = hn::Round(x);
@@ -74,15 +75,16 @@ HWY_INLINE Real<D> Exp2Minus1(D d, Real<D> x) {
   return hn::MulAdd(power, y, power - Splat(d, 1));
 }
 
-/// From the sampler's square to [-1, 1]^2, centred on its 2^-24 grid: no coordinate is ever -1, 0 or 1.
+/// From the sampler's square to [-1, 1]^2, centred on its 2^-24 grid: no coordinate is ever -1, 0
+/// or 1.
 template <class D>
 HWY_INLINE Vec2<D> SignedSquare(D d, const Vec2<D>& u) {
   const Real<D> offset = Splat(d, 0x1p-24 - 1);
   return {hn::MulAdd(u.x, Splat(d, 2), offset), hn::MulAdd(u.y, Splat(d, 2), offset)};
 }
 
-/// Concentric map of the square to the unit disk (Shirley and Chiu 1997); the distance from the centre is
-/// max(|s.x|, |s.y|).
+/// Concentric map of the square to the unit disk (Shirley and Chiu 1997); the distance from the
+/// centre is max(|s.x|, |s.y|).
 template <class D>
 HWY_INLINE Vec2<D> ConcentricDisk(D d, const Vec2<D>& s) {
   const Mask<D> wide = hn::Gt(hn::Abs(s.x), hn::Abs(s.y));
@@ -98,7 +100,8 @@ HWY_INLINE Vec2<D> SampleDisk(D d, const Vec2<D>& u) {
   return ConcentricDisk(d, SignedSquare(d, u));
 }
 
-/// Direction around +z with density cos / pi; z > 0 always, because z^2 = (1 - r)(1 + r) loses nothing.
+/// Direction around +z with density cos / pi; z > 0 always, because z^2 = (1 - r)(1 + r) loses
+/// nothing.
 template <class D>
 HWY_INLINE Vec3<D> SampleCosineHemisphere(D d, const Vec2<D>& u) {
   const Vec2<D> s = SignedSquare(d, u);

@@ -1,4 +1,5 @@
-// Builds the albedo tables: only + - * / and sqrt in a fixed order, so every machine gets the same bits.
+// Builds the albedo tables: only + - * / and sqrt in a fixed order, so every machine gets the same
+// bits.
 #include "stages/tables/bsdf_tables.h"
 
 #include <algorithm>
@@ -9,7 +10,9 @@
 namespace carpool::stages {
 namespace {
 
-double Fifth(double x) { return x * x * x * x * x; }
+double Fifth(double x) {
+  return x * x * x * x * x;
+}
 
 /// cos((j + 1/2) pi / n) for j < n, from half-angle formulas and rotation; n is a power of two.
 std::vector<double> HalfTurnCosines(int n) {
@@ -67,7 +70,8 @@ Ring SumRing(const Outgoing& o, double height, const std::vector<double>& cosine
     const double mu_in = 2 * dot * above / length2 - o.mu;
     if (mu_in <= 0) continue;
     const double smith_in = std::sqrt(mu_in * mu_in + o.alpha * o.alpha * (1 - mu_in * mu_in));
-    const double weight = mu_in * (o.mu + o.smith) / (o.mu * smith_in + mu_in * o.smith);  // G2 / G1
+    const double weight =
+        mu_in * (o.mu + o.smith) / (o.mu * smith_in + mu_in * o.smith);  // G2 / G1
     ring.all += weight;
     ring.fresnel += weight * Fifth(1 - dot / std::sqrt(length2));
   }
@@ -97,7 +101,9 @@ AlbedoPair Integrate(double mu, double alpha, int heights, const std::vector<dou
   return {std::max(0.0, 1 - sum.all * scale), sum.fresnel * scale};
 }
 
-double NodeRoughness(int i, int count) { return kMinRoughness + (1 - kMinRoughness) * i / (count - 1); }
+double NodeRoughness(int i, int count) {
+  return kMinRoughness + (1 - kMinRoughness) * i / (count - 1);
+}
 
 double InverseCoordinate(double coordinate, double alpha) {
   double low = 0, high = 1;
@@ -110,12 +116,15 @@ double InverseCoordinate(double coordinate, double alpha) {
 
 int32_t Pack(double mu, const AlbedoPair& e) {
   const double c = e.b - (1 - e.m) * Fifth(1 - mu);
-  const auto m_bits = static_cast<uint32_t>(std::floor(std::clamp(e.m, 0.0, 1.0) / kAlbedoUnitM + 0.5));
-  const auto c_bits = static_cast<uint32_t>(std::floor((std::clamp(c, -1.0, 1.0) + 1) / kAlbedoUnitC + 0.5));
+  const auto m_bits =
+      static_cast<uint32_t>(std::floor(std::clamp(e.m, 0.0, 1.0) / kAlbedoUnitM + 0.5));
+  const auto c_bits =
+      static_cast<uint32_t>(std::floor((std::clamp(c, -1.0, 1.0) + 1) / kAlbedoUnitC + 0.5));
   return static_cast<int32_t>((m_bits << 16) | c_bits);
 }
 
-/// 2 * integral of mu f(mu), of the table as it is interpolated: layers then conserve energy exactly.
+/// 2 * integral of mu f(mu), of the table as it is interpolated: layers then conserve energy
+/// exactly.
 AlbedoPair Average(const BsdfTables& tables, double roughness) {
   constexpr int kSteps = 512;
   AlbedoPair sum{0, 0};

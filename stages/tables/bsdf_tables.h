@@ -2,8 +2,9 @@
 //
 // With Schlick's F = F0 + (F90 - F0)(1 - cos)^5, single-scattering GGX with height-correlated Smith
 // shadowing has the albedo F0 A + F90 B at cosine mu. The table keeps M = 1 - A - B (what leaves by
-// further scattering) and C = B - (1 - M)(1 - mu)^5 (what roughness adds to the smooth surface's Fresnel
-// term); both change over mu ~ alpha, and the coordinate `AlbedoCoordinate` follows them there.
+// further scattering) and C = B - (1 - M)(1 - mu)^5 (what roughness adds to the smooth surface's
+// Fresnel term); both change over mu ~ alpha, and the coordinate `AlbedoCoordinate` follows them
+// there.
 #pragma once
 
 #include <array>
@@ -12,18 +13,19 @@
 
 namespace carpool::stages {
 
-/// alpha = roughness^2 is at least kMinRoughness^2 = 1e-4: a half-vector in float locates the peak of D to
-/// 1e-3 of its width there, and an image cannot tell 1e-4 from a mirror.
+/// alpha = roughness^2 is at least kMinRoughness^2 = 1e-4: a half-vector in float locates the peak
+/// of D to 1e-3 of its width there, and an image cannot tell 1e-4 from a mirror.
 constexpr double kMinRoughness = 0.01;
 
 constexpr int kAlbedoCosines = 48;
-constexpr int kAlbedoRoughnesses = 32;   // uniform in roughness from kMinRoughness to 1
+constexpr int kAlbedoRoughnesses = 32;    // uniform in roughness from kMinRoughness to 1
 constexpr int kAverageRoughnesses = 249;  // likewise; means grow as roughness^4, so they need more
 
-/// Columns of the table of averages: 2 * integral of mu M, of mu B, the log2 below, and one of padding.
+/// Columns of the table of averages: 2 * integral of mu M, of mu B, the log2 below, and one of
+/// padding.
 constexpr int kAverageColumns = 4;
-/// Bounces after the first are sampled with density ~ mu / (mu^2 + b), which follows M when b is about
-/// 2 alpha^2; the third column is log2(1 + 1 / b). Any positive value would be correct.
+/// Bounces after the first are sampled with density ~ mu / (mu^2 + b), which follows M when b is
+/// about 2 alpha^2; the third column is log2(1 + 1 / b). Any positive value would be correct.
 constexpr double kSpreadPerAlpha2 = 2;
 
 /// Fixed-point scales: M in [0, 1] in the upper 16 bits, C in [-1, 1] in the lower.
@@ -32,8 +34,8 @@ constexpr double kAlbedoUnitC = 2.0 / 65535;
 /// Share of the coordinate that follows mu / alpha; the rest is linear in mu.
 constexpr double kAlbedoCoordinateShare = 0.6;
 
-/// Largest error of an interpolated albedo (any F0 <= F90 <= 1), hence of every furnace: for mu >= 0.01,
-/// and down to mu = 1e-4. Measured by tests/stages/bsdf_tables_test.cpp.
+/// Largest error of an interpolated albedo (any F0 <= F90 <= 1), hence of every furnace: for mu >=
+/// 0.01, and down to mu = 1e-4. Measured by tests/stages/bsdf_tables_test.cpp.
 constexpr double kAlbedoResidual = 0.002;
 constexpr double kAlbedoResidualGrazing = 0.004;
 
@@ -55,10 +57,12 @@ const BsdfTables& SharedBsdfTables();
 
 /// Position in [0, 1] along the table's cosine axis; kernels use the same formula.
 inline double AlbedoCoordinate(double mu, double alpha) {
-  return kAlbedoCoordinateShare * std::sqrt(mu * (1 + alpha) / (mu + alpha)) + (1 - kAlbedoCoordinateShare) * mu;
+  return kAlbedoCoordinateShare * std::sqrt(mu * (1 + alpha) / (mu + alpha)) +
+         (1 - kAlbedoCoordinateShare) * mu;
 }
 
-/// Albedo integrals by quadrature: M and B at one cosine and alpha, with `heights` x `azimuths` points.
+/// Albedo integrals by quadrature: M and B at one cosine and alpha, with `heights` x `azimuths`
+/// points.
 struct AlbedoPair {
   double m, b;
 };

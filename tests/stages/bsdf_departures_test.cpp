@@ -1,5 +1,5 @@
-// Where our BSDF departs from the glTF sample BRDF (specification, appendix B), and by how much: the
-// figures that stages/README.md states.
+// Where our BSDF departs from the glTF sample BRDF (specification, appendix B), and by how much:
+// the figures that stages/README.md states.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,9 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kRoughnesses[] = {0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1};
 constexpr double kCosines[] = {0.02, 0.05, 0.1, 0.17364818, 0.3, 0.5, 0.7, 0.85, 1};
 
-double Schlick(double f0, double f90, double cosine) { return f0 + (f90 - f0) * std::pow(1 - cosine, 5); }
+double Schlick(double f0, double f90, double cosine) {
+  return f0 + (f90 - f0) * std::pow(1 - cosine, 5);
+}
 
 /// Albedo of (1 - F(wo.h)) / pi, the sample BRDF's diffuse term on a white base.
 double SampleDiffuse(double mu, double f0) {
@@ -27,7 +29,8 @@ double SampleDiffuse(double mu, double f0) {
   for (int i = 0; i < kSteps; ++i) {
     const double z = std::sqrt((i + 0.5) / kSteps);
     for (int j = 0; j < kSteps; ++j) {
-      const double cosine = z * mu + std::sqrt(1 - z * z) * sine * std::cos(2 * kPi * (j + 0.5) / kSteps);
+      const double cosine =
+          z * mu + std::sqrt(1 - z * z) * sine * std::cos(2 * kPi * (j + 0.5) / kSteps);
       sum += 1 - Schlick(f0, 1, std::sqrt((1 + cosine) / 2));
     }
   }
@@ -64,7 +67,8 @@ struct Worst {
   }
 };
 
-// White dielectric of ior 1.5: ours returns 1. The sample BRDF's Fresnel-mixed diffuse gains and loses.
+// White dielectric of ior 1.5: ours returns 1. The sample BRDF's Fresnel-mixed diffuse gains and
+// loses.
 TEST(BsdfDepartures, DiffuseUnderTheInterface) {
   Worst worst;
   for (const double mu : kCosines) {
@@ -84,7 +88,8 @@ TEST(BsdfDepartures, DiffuseUnderTheInterface) {
 TEST(BsdfDepartures, FurtherBounces) {
   Worst worst;
   for (const double mu : kCosines) {
-    for (const double roughness : kRoughnesses) worst.Add(-stages::IntegrateAlbedo(mu, roughness * roughness, 96, 64).m, mu, roughness);
+    for (const double roughness : kRoughnesses)
+      worst.Add(-stages::IntegrateAlbedo(mu, roughness * roughness, 96, 64).m, mu, roughness);
   }
   worst.Print("glTF with correlated shadowing - ours, white metal");
   EXPECT_NEAR(worst.difference, -0.693, 0.002);
@@ -110,7 +115,8 @@ TEST(BsdfDepartures, FadingGrazingReflectance) {
     const double faint = std::max(1 - (iors[i] - 1) / 0.36, 0.0), f90 = 1 - faint * faint;
     for (const double mu : kCosines) {
       for (const double roughness : kRoughnesses) {
-        worst[i].Add((1 - f90) * stages::IntegrateAlbedo(mu, roughness * roughness, 96, 64).b, mu, roughness);
+        worst[i].Add((1 - f90) * stages::IntegrateAlbedo(mu, roughness * roughness, 96, 64).b, mu,
+                     roughness);
       }
     }
     worst[i].Print(("glTF - ours, black dielectric, ior " + std::to_string(iors[i])).c_str());

@@ -73,8 +73,12 @@ void ExpectWhite(Surface (*make)(double)) {
 }
 
 // Hard case 16, and its dielectric twin.
-TEST(BsdfEnergy, WhiteMetalReturnsAllLight) { ExpectWhite(WhiteMetal); }
-TEST(BsdfEnergy, WhiteDielectricReturnsAllLight) { ExpectWhite(WhiteDielectric); }
+TEST(BsdfEnergy, WhiteMetalReturnsAllLight) {
+  ExpectWhite(WhiteMetal);
+}
+TEST(BsdfEnergy, WhiteDielectricReturnsAllLight) {
+  ExpectWhite(WhiteDielectric);
+}
 TEST(BsdfEnergy, HalfMetalReturnsAllLight) {
   ExpectWhite([](double roughness) {
     Surface s = WhiteDielectric(roughness);
@@ -99,7 +103,9 @@ TEST(BsdfEnergy, NoSurfaceReturnsMoreThanItGets) {
       s.base[0] = 1;
       const Furnace furnace = MeasureFurnace(s, mu);
       for (const Mean& channel : furnace.albedo) {
-        EXPECT_LE(channel.Value(), 1 + stages::kAlbedoResidualGrazing + kDeviations * channel.Error()) << s.name << ", mu " << mu;
+        EXPECT_LE(channel.Value(),
+                  1 + stages::kAlbedoResidualGrazing + kDeviations * channel.Error())
+            << s.name << ", mu " << mu;
       }
     }
   }
@@ -109,7 +115,8 @@ TEST(BsdfEnergy, WeightsAreBounded) {
   double worst = 0;
   for (const double roughness : {0.0, 0.005, 0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.8, 1.0}) {
     for (const double mu : {1e-4, 0.001, 0.01, 0.05, 0.2, 0.6, 1.0}) {
-      for (const Surface& s : {WhiteMetal(roughness), WhiteDielectric(roughness), Mixed(roughness)}) {
+      for (const Surface& s :
+           {WhiteMetal(roughness), WhiteDielectric(roughness), Mixed(roughness)}) {
         const double weight = MeasureFurnace(s, mu).largest_weight;
         EXPECT_LT(weight, 16) << s.name << ", mu " << mu;
         worst = std::max(worst, weight);
@@ -140,15 +147,18 @@ TEST(BsdfEnergy, WeakWhiteFurnace) {
     for (const double mu : {0.1, 0.4, 0.9}) {
       Columns wi(3);
       for (int i = 0; i < kHeights * kTurns; ++i) {
-        const double z = (i / kTurns + 0.5) / kHeights * 2 - 1, angle = (i % kTurns + 0.5) / kTurns * 2 * kPi;
+        const double z = (i / kTurns + 0.5) / kHeights * 2 - 1,
+                     angle = (i % kTurns + 0.5) / kTurns * 2 * kPi;
         const double sine = std::sqrt((1 - z) * (1 + z));
         wi[0].push_back(sine * std::cos(angle));
         wi[1].push_back(sine * std::sin(angle));
         wi[2].push_back(z);
       }
       double sum = 0;
-      for (const double pdf : ReferenceBsdfKernels().visible_pdf(alpha, OutgoingAt(mu), wi)) sum += pdf;
-      EXPECT_NEAR(sum * 4 * kPi / (kHeights * kTurns), 1, 2e-3) << "alpha " << alpha << ", mu " << mu;
+      for (const double pdf : ReferenceBsdfKernels().visible_pdf(alpha, OutgoingAt(mu), wi))
+        sum += pdf;
+      EXPECT_NEAR(sum * 4 * kPi / (kHeights * kTurns), 1, 2e-3)
+          << "alpha " << alpha << ", mu " << mu;
     }
   }
 }

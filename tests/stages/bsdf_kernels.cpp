@@ -27,7 +27,8 @@ SurfaceParams<D> ParamsOf(D d, const tests::Surface& s) {
 
 template <class D>
 Vec3<D> LoadDirection(D d, const Columns& columns, size_t first, size_t i) {
-  return {LoadColumn(d, columns[first], i), LoadColumn(d, columns[first + 1], i), LoadColumn(d, columns[first + 2], i)};
+  return {LoadColumn(d, columns[first], i), LoadColumn(d, columns[first + 1], i),
+          LoadColumn(d, columns[first + 2], i)};
 }
 template <class D>
 void StoreVector(D d, const Vec3<D>& v, Columns& columns, size_t first, size_t i) {
@@ -77,11 +78,13 @@ Columns RunVisible(double alpha_value, const tests::Direction& from, const Colum
   const Vec3<D> wo = Splat3(d, from.x, from.y, from.z);
   const Real<D> alpha = Splat(d, alpha_value);
   for (size_t i = 0; i < size; i += hn::Lanes(d)) {
-    const Vec3<D> normal = SampleVisibleNormal(d, wo, alpha, Vec2<D>{LoadColumn(d, u[0], i), LoadColumn(d, u[1], i)});
+    const Vec3<D> normal =
+        SampleVisibleNormal(d, wo, alpha, Vec2<D>{LoadColumn(d, u[0], i), LoadColumn(d, u[1], i)});
     const Vec3<D> wi = Reflect(wo, normal);
     const Real<D> root_o = SmithRoot(wo, alpha), root_i = SmithRoot(wi, alpha);
     const Real<D> cosine = hn::Max(wi.z, hn::Zero(d));
-    const Real<D> ratio = MicrofacetScale(d, wo, cosine, root_o, root_i) / VisibleNormalScale(d, wo, root_o);
+    const Real<D> ratio =
+        MicrofacetScale(d, wo, cosine, root_o, root_i) / VisibleNormalScale(d, wo, root_o);
     StoreVector(d, wi, out, tests::kVisibleX, i);
     StoreColumn(d, ratio, out[tests::kVisibleWeight], i);
   }
@@ -89,7 +92,8 @@ Columns RunVisible(double alpha_value, const tests::Direction& from, const Colum
 }
 
 template <class D>
-std::vector<double> RunVisiblePdf(double alpha_value, const tests::Direction& from, const Columns& directions) {
+std::vector<double> RunVisiblePdf(double alpha_value, const tests::Direction& from,
+                                  const Columns& directions) {
   const D d;
   std::vector<double> out(directions[0].size());
   const Vec3<D> wo = Splat3(d, from.x, from.y, from.z);
@@ -109,7 +113,8 @@ Columns RunFresnel(const Columns& in) {
   const D d;
   Columns out(tests::kFresnelColumns, std::vector<double>(in[0].size()));
   for (size_t i = 0; i < in[0].size(); i += hn::Lanes(d)) {
-    const Real<D> cosine = LoadColumn(d, in[0], i), eta = LoadColumn(d, in[1], i), k = LoadColumn(d, in[2], i);
+    const Real<D> cosine = LoadColumn(d, in[0], i), eta = LoadColumn(d, in[1], i),
+                  k = LoadColumn(d, in[2], i);
     const Real<D> f0 = NormalReflectance(d, eta), f90 = DielectricF90(d, eta);
     StoreColumn(d, FresnelDielectric(d, cosine, eta), out[tests::kDielectric], i);
     StoreColumn(d, FresnelConductor(d, cosine, eta, k), out[tests::kConductor], i);
@@ -121,8 +126,8 @@ Columns RunFresnel(const Columns& in) {
 
 template <class D>
 tests::BsdfKernels BsdfTableOf(D d) {
-  return {TagName(d),    sizeof(hn::TFromD<D>) == 8, RunSample<D>, RunEvaluate<D>, RunVisible<D>,
-          RunVisiblePdf<D>, RunFresnel<D>};
+  return {TagName(d),    sizeof(hn::TFromD<D>) == 8, RunSample<D>, RunEvaluate<D>,
+          RunVisible<D>, RunVisiblePdf<D>,           RunFresnel<D>};
 }
 
 std::vector<tests::BsdfKernels> BsdfTestTables() {
@@ -156,8 +161,12 @@ const std::vector<BsdfKernels>& AllBsdfKernels() {
   return all;
 }
 
-const BsdfKernels& BestBsdfKernels() { return AllBsdfKernels()[0]; }
-const BsdfKernels& ReferenceBsdfKernels() { return AllBsdfKernels()[2]; }
+const BsdfKernels& BestBsdfKernels() {
+  return AllBsdfKernels()[0];
+}
+const BsdfKernels& ReferenceBsdfKernels() {
+  return AllBsdfKernels()[2];
+}
 
 }  // namespace carpool::tests
 #endif  // HWY_ONCE

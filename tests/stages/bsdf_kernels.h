@@ -1,4 +1,5 @@
-// The BSDF and microfacet kernels as plain functions over columns of numbers, for every target and width.
+// The BSDF and microfacet kernels as plain functions over columns of numbers, for every target and
+// width.
 #pragma once
 
 #include <string>
@@ -22,7 +23,17 @@ struct Direction {
 };
 
 /// Columns of each kernel's result.
-enum SampleColumn { kSampleX, kSampleY, kSampleZ, kWeightR, kWeightG, kWeightB, kSamplePdf, kValid, kSampleColumns };
+enum SampleColumn {
+  kSampleX,
+  kSampleY,
+  kSampleZ,
+  kWeightR,
+  kWeightG,
+  kWeightB,
+  kSamplePdf,
+  kValid,
+  kSampleColumns
+};
 enum ValueColumn { kValueR, kValueG, kValueB, kValuePdf, kValueColumns };
 enum VisibleColumn { kVisibleX, kVisibleY, kVisibleZ, kVisibleWeight, kVisibleColumns };
 enum FresnelColumn { kDielectric, kConductor, kSchlick, kSchlickMean, kFresnelColumns };
@@ -34,7 +45,8 @@ struct BsdfKernels {
   Columns (*sample)(const Surface&, const Direction& wo, const Columns& u);
   /// wo xyz, wi xyz -> ValueColumn.
   Columns (*evaluate)(const Surface&, const Columns& directions);
-  /// u: x, y -> VisibleColumn: the mirror direction about a visible normal, also below the surface, and G2 / G1.
+  /// u: x, y -> VisibleColumn: the mirror direction about a visible normal, also below the surface,
+  /// and G2 / G1.
   Columns (*visible)(double alpha, const Direction& wo, const Columns& u);
   /// wi xyz -> the density of `visible`, zero where the half-vector is below the surface.
   std::vector<double> (*visible_pdf)(double alpha, const Direction& wo, const Columns& wi);

@@ -1,5 +1,5 @@
-// A lobe made for this test is put on top of the material's lobes: what adding one takes, and that the
-// set samples, weighs and layers it without further code.
+// A lobe made for this test is put on top of the material's lobes: what adding one takes, and that
+// the set samples, weighs and layers it without further code.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,9 @@ struct VarnishLobe {
   AlbedoRow<D> row;
   Real<D> scale;  // T(wo) / T_avg
 
-  HWY_INLINE Vec3<D> Sample(D d, const Vec3<D>& wo, const Vec2<D>& u) const { return reflection.Sample(d, wo, u); }
+  HWY_INLINE Vec3<D> Sample(D d, const Vec3<D>& wo, const Vec2<D>& u) const {
+    return reflection.Sample(d, wo, u);
+  }
 
   HWY_INLINE void Evaluate(D d, const DirectionPair<D>& pair, LobeSum<D>& sum) const {
     reflection.Evaluate(d, pair, sum);
@@ -39,7 +41,8 @@ template <class D>
 struct VarnishedBsdf : LobeSet<D, VarnishLobe, SpecularLobe, MultiScatterLobe, DiffuseLobe> {};
 
 template <class D>
-VarnishedBsdf<D> PrepareVarnished(D d, double roughness, const SurfaceParams<D>& base, const Vec3<D>& wo) {
+VarnishedBsdf<D> PrepareVarnished(D d, double roughness, const SurfaceParams<D>& base,
+                                  const Vec3<D>& wo) {
   const BsdfTablesView tables = SharedBsdfTables().View();
   VarnishedBsdf<D> bsdf;
   VarnishLobe<D>& varnish = bsdf;
@@ -70,7 +73,8 @@ double VarnishedFurnace(double roughness, double mu, const tests::Columns& u) {
   const tests::Direction from = tests::OutgoingAt(mu);
   const Vec3<D> wo = Splat3(d, from.x, from.y, from.z);
   const Real<D> one = Splat(d, 1);
-  const SurfaceParams<D> white{Splat3(d, 1, 1, 1), hn::Zero(d), one, one, hn::Lt(one, one), hn::Zero(d), Splat3(d, 1, 1, 1)};
+  const SurfaceParams<D> white{Splat3(d, 1, 1, 1), hn::Zero(d),       one, one, hn::Lt(one, one),
+                               hn::Zero(d),        Splat3(d, 1, 1, 1)};
   const VarnishedBsdf<D> bsdf = PrepareVarnished(d, roughness, white, wo);
   std::vector<double> weights(u[0].size());
   for (size_t i = 0; i < weights.size(); i += hn::Lanes(d)) {
@@ -95,8 +99,10 @@ TEST(BsdfLobes, VarnishOverWhiteReturnsAllLight) {
   for (const double roughness : {0.0, 0.1, 0.2}) {
     for (const double mu : {0.2, 0.5, 1.0}) {
       Mean mean;
-      for (uint32_t s = 0; s < 16; ++s) mean.Add(stages::HWY_NAMESPACE::VarnishedFurnace(roughness, mu, SamplerUniforms(s, 4096)));
-      EXPECT_NEAR(mean.Value(), 1, stages::kAlbedoResidual + 7.8 * mean.Error()) << "roughness " << roughness << ", mu " << mu;
+      for (uint32_t s = 0; s < 16; ++s)
+        mean.Add(stages::HWY_NAMESPACE::VarnishedFurnace(roughness, mu, SamplerUniforms(s, 4096)));
+      EXPECT_NEAR(mean.Value(), 1, stages::kAlbedoResidual + 7.8 * mean.Error())
+          << "roughness " << roughness << ", mu " << mu;
       EXPECT_LT(mean.Error(), 1e-3);
     }
   }

@@ -1,5 +1,5 @@
-// Sampling against densities: chi-squared over the sphere and around the mirror direction, and light
-// sampling against BSDF sampling.
+// Sampling against densities: chi-squared over the sphere and around the mirror direction, and
+// light sampling against BSDF sampling.
 //
 // Expected counts integrate the pdf of the double kernels; samples come from the float kernels with
 // independent random numbers. False-alarm rate 1e-6 per check, fixed seeds.
@@ -31,10 +31,12 @@ struct Grid {
 Grid MakeGrid(const Direction& axis, std::vector<double> edges, int sectors) {
   const bool upright = std::abs(axis.z) > 0.9;
   const Direction other = upright ? Direction{1, 0, 0} : Direction{0, 0, 1};
-  Direction t{other.y * axis.z - other.z * axis.y, other.z * axis.x - other.x * axis.z, other.x * axis.y - other.y * axis.x};
+  Direction t{other.y * axis.z - other.z * axis.y, other.z * axis.x - other.x * axis.z,
+              other.x * axis.y - other.y * axis.x};
   const double length = std::hypot(t.x, t.y, t.z);
   t = {t.x / length, t.y / length, t.z / length};
-  const Direction b{axis.y * t.z - axis.z * t.y, axis.z * t.x - axis.x * t.z, axis.x * t.y - axis.y * t.x};
+  const Direction b{axis.y * t.z - axis.z * t.y, axis.z * t.x - axis.x * t.z,
+                    axis.x * t.y - axis.y * t.x};
   return {axis, t, b, std::move(edges), sectors};
 }
 
@@ -61,19 +63,22 @@ void AddRing(const Grid& grid, size_t ring, const Pdf& pdf, int fine, std::vecto
     const int sector = i / (fine * fine), within = i % (fine * fine);
     const double angle = grid.edges[ring] + (within / fine + 0.5) * step;
     const double turn = ((sector + (within % fine + 0.5) / fine) / grid.sectors - 0.5) * 2 * kPi;
-    const double s = std::sin(angle), u = s * std::cos(turn), v = s * std::sin(turn), w = std::cos(angle);
+    const double s = std::sin(angle), u = s * std::cos(turn), v = s * std::sin(turn),
+                 w = std::cos(angle);
     wi[0][i] = u * grid.tangent.x + v * grid.bitangent.x + w * grid.axis.x;
     wi[1][i] = u * grid.tangent.y + v * grid.bitangent.y + w * grid.axis.y;
     wi[2][i] = u * grid.tangent.z + v * grid.bitangent.z + w * grid.axis.z;
     areas[i] = s * step * 2 * kPi / (grid.sectors * fine);
   }
   const std::vector<double> density = pdf(wi);
-  for (int i = 0; i < points; ++i) masses[ring * grid.sectors + i / (fine * fine)] += density[i] * areas[i];
+  for (int i = 0; i < points; ++i)
+    masses[ring * grid.sectors + i / (fine * fine)] += density[i] * areas[i];
 }
 
 std::vector<double> Masses(const Grid& grid, const Pdf& pdf, int fine) {
   std::vector<double> masses((grid.edges.size() - 1) * grid.sectors, 0);
-  for (size_t ring = 0; ring + 1 < grid.edges.size(); ++ring) AddRing(grid, ring, pdf, fine, masses);
+  for (size_t ring = 0; ring + 1 < grid.edges.size(); ++ring)
+    AddRing(grid, ring, pdf, fine, masses);
   return masses;
 }
 
@@ -87,15 +92,17 @@ Grid SphereGrid() {
 /// Rings around the mirror direction in units of alpha, then out to the far side.
 Grid MirrorGrid(const Direction& wo, double alpha) {
   std::vector<double> edges = {0};
-  for (const double r : {0.2, 0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0}) edges.push_back(r * alpha);
+  for (const double r : {0.2, 0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0, 7.0, 10.0})
+    edges.push_back(r * alpha);
   for (double angle = 16 * alpha; angle < 0.8; angle *= 1.6) edges.push_back(angle);
   edges.push_back(kPi);
   return MakeGrid({-wo.x, -wo.y, wo.z}, edges, 16);
 }
 
-/// Chi-squared of samples against masses; one more cell holds what fell outside or was invalid. The far
-/// cell of `pool_last` rings is pooled there too, where midpoints do not integrate well.
-double SampleTest(const Grid& grid, const Columns& wi, const std::vector<double>* valid, std::vector<double> masses, size_t pool_last) {
+/// Chi-squared of samples against masses; one more cell holds what fell outside or was invalid. The
+/// far cell of `pool_last` rings is pooled there too, where midpoints do not integrate well.
+double SampleTest(const Grid& grid, const Columns& wi, const std::vector<double>* valid,
+                  std::vector<double> masses, size_t pool_last) {
   std::vector<double> counts(masses.size() + 1, 0);
   const size_t pooled_from = masses.size() - pool_last * grid.sectors;
   for (size_t i = 0; i < wi[0].size(); ++i) {
@@ -124,15 +131,19 @@ Pdf PdfOf(const Surface& surface, const Direction& wo) {
 }
 
 /// The lobe is narrow across the plane of incidence at grazing angles.
-int FineSteps(double mu) { return mu < 0.1 ? 48 : 12; }
+int FineSteps(double mu) {
+  return mu < 0.1 ? 48 : 12;
+}
 
-double MixtureTest(const Surface& drawn, const Surface& claimed, double mu, uint32_t seed, bool around_mirror) {
+double MixtureTest(const Surface& drawn, const Surface& claimed, double mu, uint32_t seed,
+                   bool around_mirror) {
   const Direction wo = OutgoingAt(mu);
   const double alpha = std::max(claimed.roughness * claimed.roughness, 1e-4);
   const Grid grid = around_mirror ? MirrorGrid(wo, alpha) : SphereGrid();
   const Columns out = BestBsdfKernels().sample(drawn, wo, IndependentUniforms(3, kCount, seed));
   const Columns wi(out.begin() + kSampleX, out.begin() + kSampleX + 3);
-  const std::vector<double> masses = Masses(grid, PdfOf(claimed, wo), around_mirror ? 8 : FineSteps(mu));
+  const std::vector<double> masses =
+      Masses(grid, PdfOf(claimed, wo), around_mirror ? 8 : FineSteps(mu));
   return SampleTest(grid, wi, &out[kValid], masses, around_mirror ? 1 : 0);
 }
 
@@ -142,7 +153,8 @@ TEST(BsdfSampling, MixtureFollowsItsDensityOverTheSphere) {
   for (const double roughness : {0.4, 0.6, 1.0}) {
     for (const double mu : {0.04, 0.3, 0.9}) {
       for (const Surface& s : {WhiteMetal(roughness), Mixed(roughness)}) {
-        EXPECT_GT(MixtureTest(s, s, mu, ++seed, false), kFalseAlarm) << s.name << ", mu " << mu << ", seed " << seed;
+        EXPECT_GT(MixtureTest(s, s, mu, ++seed, false), kFalseAlarm)
+            << s.name << ", mu " << mu << ", seed " << seed;
       }
     }
   }
@@ -153,7 +165,8 @@ TEST(BsdfSampling, MixtureFollowsItsDensityAroundTheMirror) {
   for (const double roughness : {0.01, 0.03, 0.1, 0.2}) {
     for (const double mu : {0.3, 0.9}) {
       for (const Surface& s : {WhiteMetal(roughness), Mixed(roughness)}) {
-        EXPECT_GT(MixtureTest(s, s, mu, ++seed, true), kFalseAlarm) << s.name << ", mu " << mu << ", seed " << seed;
+        EXPECT_GT(MixtureTest(s, s, mu, ++seed, true), kFalseAlarm)
+            << s.name << ", mu " << mu << ", seed " << seed;
       }
     }
   }
@@ -178,8 +191,11 @@ TEST(BsdfSampling, VisibleNormalsFollowTheirDensityOverTheWholeSphere) {
     for (const double mu : {0.05, 0.4, 1.0}) {
       const Direction wo = OutgoingAt(mu);
       const Grid grid = SphereGrid();
-      const Columns out = BestBsdfKernels().visible(alpha, wo, IndependentUniforms(2, kCount, ++seed));
-      const Pdf pdf = [&](const Columns& wi) { return ReferenceBsdfKernels().visible_pdf(alpha, wo, wi); };
+      const Columns out =
+          BestBsdfKernels().visible(alpha, wo, IndependentUniforms(2, kCount, ++seed));
+      const Pdf pdf = [&](const Columns& wi) {
+        return ReferenceBsdfKernels().visible_pdf(alpha, wo, wi);
+      };
       const Columns wi(out.begin(), out.begin() + 3);
       EXPECT_GT(SampleTest(grid, wi, nullptr, Masses(grid, pdf, FineSteps(mu)), 0), kFalseAlarm)
           << "alpha " << alpha << ", mu " << mu << ", seed " << seed;
@@ -203,7 +219,8 @@ LightEstimates EstimateLight(const Surface& surface, double mu, double radius, u
   Columns directions(6, std::vector<double>(kLightCount));
   for (size_t i = 0; i < kLightCount; ++i) {
     const double half = std::sin(radius / 2) * std::sqrt(u[0][i]);  // sine of half the polar angle
-    const double cosine = 1 - 2 * half * half, sine = 2 * half * std::sqrt(1 - half * half), turn = 2 * kPi * u[1][i];
+    const double cosine = 1 - 2 * half * half, sine = 2 * half * std::sqrt(1 - half * half),
+                 turn = 2 * kPi * u[1][i];
     const double a = sine * std::cos(turn), b = sine * std::sin(turn);
     const double wi[] = {a * frame.tangent.x + b * frame.bitangent.x + cosine * frame.axis.x,
                          a * frame.tangent.y + b * frame.bitangent.y + cosine * frame.axis.y,
@@ -214,7 +231,8 @@ LightEstimates EstimateLight(const Surface& surface, double mu, double radius, u
   const Columns values = BestBsdfKernels().evaluate(surface, directions);
   for (const double f_cos : values[kValueG]) estimates.light.Add(f_cos * solid_angle);
 
-  const Columns out = BestBsdfKernels().sample(surface, wo, IndependentUniforms(3, kLightCount, seed + 1));
+  const Columns out =
+      BestBsdfKernels().sample(surface, wo, IndependentUniforms(3, kLightCount, seed + 1));
   for (size_t i = 0; i < kLightCount; ++i) {
     const bool hit = CellOf(frame, out[kSampleX][i], out[kSampleY][i], out[kSampleZ][i]) == 0;
     estimates.bsdf.Add(hit ? out[kWeightG][i] : 0);
@@ -229,9 +247,11 @@ TEST(BsdfSampling, LightSamplingEqualsBsdfSamplingAtSmallAlpha) {
     for (const double mu : {0.2, 0.7, 1.0}) {
       for (const Surface& s : {WhiteMetal(std::sqrt(alpha)), Mixed(std::sqrt(alpha))}) {
         const LightEstimates e = EstimateLight(s, mu, 3 * alpha, seed += 2);
-        const double z = (e.light.Value() - e.bsdf.Value()) / std::hypot(e.light.Error(), e.bsdf.Error());
-        EXPECT_GT(NormalTail(z), kFalseAlarm) << s.name << ", mu " << mu << ": light " << e.light.Value() << " +- " << e.light.Error()
-                                              << ", BSDF " << e.bsdf.Value() << " +- " << e.bsdf.Error();
+        const double z =
+            (e.light.Value() - e.bsdf.Value()) / std::hypot(e.light.Error(), e.bsdf.Error());
+        EXPECT_GT(NormalTail(z), kFalseAlarm)
+            << s.name << ", mu " << mu << ": light " << e.light.Value() << " +- " << e.light.Error()
+            << ", BSDF " << e.bsdf.Value() << " +- " << e.bsdf.Error();
         EXPECT_LT(e.light.Error(), 0.01 * e.light.Value());
       }
     }

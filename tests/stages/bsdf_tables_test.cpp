@@ -1,4 +1,5 @@
-// The albedo tables against finer quadrature: the residual that stages/tables/bsdf_tables.h declares.
+// The albedo tables against finer quadrature: the residual that stages/tables/bsdf_tables.h
+// declares.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +16,9 @@ using stages::AlbedoPair;
 using stages::BsdfTables;
 
 /// Largest error of F0 A + F90 B for any 0 <= F0 <= F90 <= 1: it is at (1, 1) or at (0, 1).
-double WorstError(const AlbedoPair& a, const AlbedoPair& b) { return std::max(std::abs(a.m - b.m), std::abs(a.b - b.b)); }
+double WorstError(const AlbedoPair& a, const AlbedoPair& b) {
+  return std::max(std::abs(a.m - b.m), std::abs(a.b - b.b));
+}
 
 TEST(BsdfTables, InterpolationStaysWithinTheDeclaredResidual) {
   const BsdfTables& tables = stages::SharedBsdfTables();
@@ -27,7 +30,8 @@ TEST(BsdfTables, InterpolationStaysWithinTheDeclaredResidual) {
       (mu < 0.01 ? worst_grazing : worst) = std::max(mu < 0.01 ? worst_grazing : worst, error);
     }
   }
-  std::printf("albedo tables: residual %.5f at mu >= 0.01, %.5f down to 1e-4\n", worst, worst_grazing);
+  std::printf("albedo tables: residual %.5f at mu >= 0.01, %.5f down to 1e-4\n", worst,
+              worst_grazing);
   EXPECT_LE(worst, stages::kAlbedoResidual);
   EXPECT_LE(worst_grazing, stages::kAlbedoResidualGrazing);
   // The declaration is not padded either.
@@ -48,7 +52,8 @@ TEST(BsdfTables, QuadratureHasTheClosedForm) {
 TEST(BsdfTables, AveragesAreThoseOfTheInterpolatedTable) {
   const BsdfTables& tables = stages::SharedBsdfTables();
   for (double roughness = 0.013; roughness <= 1; roughness += 0.0611) {
-    const double row = (roughness - stages::kMinRoughness) / (1 - stages::kMinRoughness) * (stages::kAverageRoughnesses - 1);
+    const double row = (roughness - stages::kMinRoughness) / (1 - stages::kMinRoughness) *
+                       (stages::kAverageRoughnesses - 1);
     const int i = static_cast<int>(row);
     const float* at = &tables.average[i * stages::kAverageColumns];
     double m = 0, b = 0;
@@ -59,8 +64,10 @@ TEST(BsdfTables, AveragesAreThoseOfTheInterpolatedTable) {
       m += 6 * std::pow(t, 5) / kSteps * e.m;
       b += 6 * std::pow(t, 5) / kSteps * e.b;
     }
-    EXPECT_NEAR(at[0] + (row - i) * (at[stages::kAverageColumns] - at[0]), m, 0.004 * m + 1e-6) << roughness;
-    EXPECT_NEAR(at[1] + (row - i) * (at[stages::kAverageColumns + 1] - at[1]), b, 0.004 * b) << roughness;
+    EXPECT_NEAR(at[0] + (row - i) * (at[stages::kAverageColumns] - at[0]), m, 0.004 * m + 1e-6)
+        << roughness;
+    EXPECT_NEAR(at[1] + (row - i) * (at[stages::kAverageColumns + 1] - at[1]), b, 0.004 * b)
+        << roughness;
   }
 }
 
@@ -68,7 +75,8 @@ TEST(BsdfTables, TheBitsAreTheSameOnEveryMachine) {
   const BsdfTables& tables = stages::SharedBsdfTables();
   uint32_t hash = 0;
   for (const int32_t word : tables.albedo) hash = hash * 31 + static_cast<uint32_t>(word);
-  EXPECT_EQ(hash, 0xccf6b4c1u) << "changed tables change every image: if that is meant, put the new hash here";
+  EXPECT_EQ(hash, 0xccf6b4c1u)
+      << "changed tables change every image: if that is meant, put the new hash here";
 }
 
 }  // namespace

@@ -27,7 +27,8 @@ TEST(Fresnel, KnownValues) {
   const double cos45 = std::sqrt(0.5);
   for (const BsdfKernels& kernels : AllBsdfKernels()) {
     SCOPED_TRACE(kernels.name);
-    const Columns r = FresnelAt(kernels, {{1, 1.5, 0}, {cos45, 1.5, 0}, {0.3, 1, 0}, {0.5, 1 / 1.5, 0}, {0, 1.5, 0}});
+    const Columns r = FresnelAt(
+        kernels, {{1, 1.5, 0}, {cos45, 1.5, 0}, {0.3, 1, 0}, {0.5, 1 / 1.5, 0}, {0, 1.5, 0}});
     EXPECT_NEAR(r[kDielectric][0], 0.04, 1e-7);
     EXPECT_NEAR(r[kDielectric][1], 0.05024, 1e-5);
     EXPECT_NEAR(r[kDielectric][2], 0, 1e-7);
@@ -42,15 +43,18 @@ TEST(Fresnel, ConductorWithoutAbsorptionIsTheDielectric) {
   std::vector<std::array<double, 3>> arguments;
   for (int i = 0; i <= 64; ++i) arguments.push_back({i / 64.0, 1.1 + i % 7 * 0.3, 0});
   const Columns r = FresnelAt(ReferenceBsdfKernels(), arguments);
-  for (size_t i = 0; i < arguments.size(); ++i) EXPECT_NEAR(r[kConductor][i], r[kDielectric][i], 1e-12);
+  for (size_t i = 0; i < arguments.size(); ++i)
+    EXPECT_NEAR(r[kConductor][i], r[kDielectric][i], 1e-12);
   const Columns f = FresnelAt(BestBsdfKernels(), arguments);
-  for (size_t i = 0; i < arguments.size(); ++i) EXPECT_NEAR(f[kConductor][i], f[kDielectric][i], 2e-5);
+  for (size_t i = 0; i < arguments.size(); ++i)
+    EXPECT_NEAR(f[kConductor][i], f[kDielectric][i], 2e-5);
 }
 
 TEST(Fresnel, DiffuseMeans) {
   const auto mean = [](double ior, FresnelColumn column) {
     std::vector<std::array<double, 3>> arguments;
-    for (int i = 0; i < 1 << 14; ++i) arguments.push_back({std::sqrt((i + 0.5) / (1 << 14)), ior, 0});
+    for (int i = 0; i < 1 << 14; ++i)
+      arguments.push_back({std::sqrt((i + 0.5) / (1 << 14)), ior, 0});
     const Columns r = FresnelAt(ReferenceBsdfKernels(), arguments);
     double sum = 0;
     for (const double value : r[column]) sum += value;
@@ -65,7 +69,8 @@ TEST(Fresnel, DiffuseMeans) {
   }
 }
 
-Columns Evaluate(const BsdfKernels& kernels, const Surface& surface, const Columns& wo, const Columns& wi) {
+Columns Evaluate(const BsdfKernels& kernels, const Surface& surface, const Columns& wo,
+                 const Columns& wi) {
   Columns directions = wo;
   directions.insert(directions.end(), wi.begin(), wi.end());
   return kernels.evaluate(surface, directions);
@@ -76,11 +81,13 @@ TEST(Bsdf, IsReciprocal) {
   const Columns a = RandomHemisphere(4096, 1), b = RandomHemisphere(4096, 2);
   for (const double roughness : {0.0, 0.03, 0.1, 0.3, 0.6, 1.0}) {
     for (const Surface& s : {WhiteDielectric(roughness), WhiteMetal(roughness), Mixed(roughness)}) {
-      const Columns forth = Evaluate(BestBsdfKernels(), s, a, b), back = Evaluate(BestBsdfKernels(), s, b, a);
+      const Columns forth = Evaluate(BestBsdfKernels(), s, a, b),
+                    back = Evaluate(BestBsdfKernels(), s, b, a);
       for (size_t i = 0; i < 4096; ++i) {
         for (int c = 0; c < 3; ++c) {
           const double f = forth[c][i] / b[2][i], g = back[c][i] / a[2][i];
-          ASSERT_NEAR(f, g, 1e-4 * std::max(f, g) + 1e-30) << s.name << " " << a[2][i] << " " << b[2][i];
+          ASSERT_NEAR(f, g, 1e-4 * std::max(f, g) + 1e-30)
+              << s.name << " " << a[2][i] << " " << b[2][i];
         }
       }
     }
@@ -111,8 +118,10 @@ TEST(Bsdf, IorOneIsNoInterfaceAndIorZeroReflectsAll) {
   none.ior = 1;
   lambert.specular = 0;
   all.ior_zero = true;
-  const Columns a = Evaluate(BestBsdfKernels(), none, wo, wi), b = Evaluate(BestBsdfKernels(), lambert, wo, wi);
-  const Columns c = Evaluate(BestBsdfKernels(), all, wo, wi), d = Evaluate(BestBsdfKernels(), WhiteMetal(0.4), wo, wi);
+  const Columns a = Evaluate(BestBsdfKernels(), none, wo, wi),
+                b = Evaluate(BestBsdfKernels(), lambert, wo, wi);
+  const Columns c = Evaluate(BestBsdfKernels(), all, wo, wi),
+                d = Evaluate(BestBsdfKernels(), WhiteMetal(0.4), wo, wi);
   for (size_t i = 0; i < 1024; ++i) {
     ASSERT_EQ(a[kValueG][i], b[kValueG][i]);
     ASSERT_NEAR(a[kValueG][i], wi[2][i] / std::numbers::pi, 1e-6);
@@ -163,14 +172,17 @@ void ExpectFiniteExtremes() {
   for (const BsdfKernels& kernels : AllBsdfKernels()) {
     SCOPED_TRACE(kernels.name);
     for (const double roughness : {0.0, 0.01, 0.1, 1.0, -3.0, 7.0}) {
-      for (const Surface& s : {WhiteDielectric(roughness), WhiteMetal(roughness), Mixed(roughness)}) {
+      for (const Surface& s :
+           {WhiteDielectric(roughness), WhiteMetal(roughness), Mixed(roughness)}) {
         for (const auto& column : Evaluate(kernels, s, wo, wi)) {
-          for (const double x : column) ASSERT_TRUE(std::isfinite(x) && x >= 0) << s.name << " " << x;
+          for (const double x : column)
+            ASSERT_TRUE(std::isfinite(x) && x >= 0) << s.name << " " << x;
         }
         for (const double mu : cosines) {
           const Columns out = kernels.sample(s, OutgoingAt(mu), u);
           for (size_t i = 0; i < 64; ++i) {
-            for (const auto& column : out) ASSERT_TRUE(std::isfinite(column[i])) << s.name << " mu " << mu;
+            for (const auto& column : out)
+              ASSERT_TRUE(std::isfinite(column[i])) << s.name << " mu " << mu;
             ASSERT_NEAR(std::hypot(out[kSampleX][i], out[kSampleY][i], out[kSampleZ][i]), 1, 1e-6);
             // pdf^2 must not overflow in the power heuristic.
             ASSERT_LT(out[kSamplePdf][i], 1e18);
@@ -188,7 +200,8 @@ TEST(Bsdf, ExtremesAreFinite) {
   ExpectFiniteExtremes();
 }
 
-// Hard case 31, for lobes: the ends of [0, 1) never choose a lobe of weight zero, and always choose some lobe.
+// Hard case 31, for lobes: the ends of [0, 1) never choose a lobe of weight zero, and always choose
+// some lobe.
 TEST(Bsdf, EndsOfTheUnitIntervalChooseARealLobe) {
   Surface lambert = WhiteDielectric(0.3);
   lambert.specular = 0;
@@ -229,7 +242,8 @@ TEST(Bsdf, JoinsTheMirrorContinuously) {
   }
 }
 
-// One source for every width: the same bits in a lane whatever its neighbours, in each instruction set.
+// One source for every width: the same bits in a lane whatever its neighbours, in each instruction
+// set.
 TEST(Bsdf, OneLaneIsNLanesAndDoubleIsClose) {
   const Columns u = IndependentUniforms(3, 4096, 11);
   const Columns wo = RandomHemisphere(4096, 12), wi = RandomHemisphere(4096, 13);
@@ -247,7 +261,8 @@ TEST(Bsdf, OneLaneIsNLanesAndDoubleIsClose) {
         for (size_t i = 0; i < 4096; ++i) {
           // The same lobe and direction; a lobe choice may fall to the other side of its threshold.
           different += std::abs(wide[kSampleX][i] - reference[kSampleX][i]) > 1e-3 ||
-                       std::abs(wide[kWeightR][i] - reference[kWeightR][i]) > 0.02 * (1 + reference[kWeightR][i]);
+                       std::abs(wide[kWeightR][i] - reference[kWeightR][i]) >
+                           0.02 * (1 + reference[kWeightR][i]);
         }
         EXPECT_LE(different, 8u) << s.name << " mu " << mu;
       }

@@ -10,8 +10,9 @@ namespace carpool::tests {
 /// False-alarm rate of each statistical check; seeds are fixed, so a pass stays a pass.
 constexpr double kFalseAlarm = 1e-6;
 
-/// Upper tail of the chi-squared distribution: the regularised incomplete gamma function Q(k/2, x/2), by
-/// its series below the mode and Lentz's continued fraction above (Numerical Recipes, section 6.2).
+/// Upper tail of the chi-squared distribution: the regularised incomplete gamma function Q(k/2,
+/// x/2), by its series below the mode and Lentz's continued fraction above (Numerical Recipes,
+/// section 6.2).
 inline double ChiSquaredTail(double statistic, double degrees) {
   const double a = degrees / 2, x = statistic / 2;
   if (x <= 0) return 1;
@@ -33,8 +34,10 @@ inline double ChiSquaredTail(double statistic, double degrees) {
   return front * h;
 }
 
-/// p-value of counts against expected counts with the same total; cells that expect fewer than 10 are pooled.
-inline double ChiSquaredTest(const std::vector<double>& counts, const std::vector<double>& expected) {
+/// p-value of counts against expected counts with the same total; cells that expect fewer than 10
+/// are pooled.
+inline double ChiSquaredTest(const std::vector<double>& counts,
+                             const std::vector<double>& expected) {
   double statistic = 0, pooled_count = 0, pooled_expected = 0;
   double cells = 0;
   for (size_t i = 0; i < counts.size(); ++i) {
@@ -47,7 +50,8 @@ inline double ChiSquaredTest(const std::vector<double>& counts, const std::vecto
     ++cells;
   }
   if (pooled_expected >= 10) {
-    statistic += (pooled_count - pooled_expected) * (pooled_count - pooled_expected) / pooled_expected;
+    statistic +=
+        (pooled_count - pooled_expected) * (pooled_count - pooled_expected) / pooled_expected;
     ++cells;
   } else if (pooled_count > 10 + 10 * pooled_expected) {
     return 0;  // mass where there should be next to none
@@ -56,7 +60,9 @@ inline double ChiSquaredTest(const std::vector<double>& counts, const std::vecto
 }
 
 /// Two-sided p-value of a standard normal deviate.
-inline double NormalTail(double z) { return std::erfc(std::abs(z) / std::sqrt(2.0)); }
+inline double NormalTail(double z) {
+  return std::erfc(std::abs(z) / std::sqrt(2.0));
+}
 
 /// Mean of independent values and its standard error.
 struct Mean {

@@ -6,9 +6,9 @@
 
 #include "hwy/highway.h"
 
-#define FOR_EACH_TARGET(function, visit)                            \
+#define FOR_EACH_TARGET(function, visit)                             \
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) { \
-    hwy::SetSupportedTargetsForTest(target);                        \
-    visit(HWY_DYNAMIC_DISPATCH(function)());                        \
-    hwy::SetSupportedTargetsForTest(0);                             \
+    hwy::SetSupportedTargetsForTest(target);                         \
+    visit(HWY_DYNAMIC_DISPATCH(function)());                         \
+    hwy::SetSupportedTargetsForTest(0);                              \
   }

@@ -15,7 +15,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Half an ulp of float around `value`.
-double HalfUlp(double value) { return std::max(std::abs(value) * 0x1p-24, 1e-45); }
+double HalfUlp(double value) {
+  return std::max(std::abs(value) * 0x1p-24, 1e-45);
+}
 
 /// Unit normals: the poles with both signs of zero, near-poles, and random directions.
 Columns Normals(size_t count, uint32_t seed) {
@@ -32,7 +34,8 @@ Columns Normals(size_t count, uint32_t seed) {
     for (const double x : {0.0, -0.0}) add(x, 0.0, pole), add(x, -0.0, pole);
     for (int e = 1; e < 46; ++e) add(std::ldexp(1.0, -e), -std::ldexp(0.7, -e), pole);
   }
-  for (const double zero : {0.0, -0.0}) add(1, 0, zero), add(0, 1, zero), add(-1, 0, zero), add(0.6, -0.8, zero);
+  for (const double zero : {0.0, -0.0})
+    add(1, 0, zero), add(0, 1, zero), add(-1, 0, zero), add(0.6, -0.8, zero);
   for (int e = 1; e < 120; e += 7) add(0.6, 0.8, -std::ldexp(1.0, -e));
   while (n[0].size() < count) add(normal(random), normal(random), normal(random));
   return n;
@@ -55,8 +58,9 @@ TEST(Numerics, FrameIsOrthonormalFromPoleToPole) {
         const double handed = n[0][i] * (frame[1][i] * frame[5][i] - frame[2][i] * frame[4][i]) +
                               n[1][i] * (frame[2][i] * frame[3][i] - frame[0][i] * frame[5][i]) +
                               n[2][i] * (frame[0][i] * frame[4][i] - frame[1][i] * frame[3][i]);
-        const double errors[] = {Dot(frame, 0, frame, 3, i), Dot(frame, 0, n, 0, i), Dot(frame, 3, n, 0, i),
-                                 Dot(frame, 0, frame, 0, i) - 1, Dot(frame, 3, frame, 3, i) - 1, handed - 1};
+        const double errors[] = {Dot(frame, 0, frame, 3, i),     Dot(frame, 0, n, 0, i),
+                                 Dot(frame, 3, n, 0, i),         Dot(frame, 0, frame, 0, i) - 1,
+                                 Dot(frame, 3, frame, 3, i) - 1, handed - 1};
         for (const double error : errors) {
           ASSERT_LE(std::abs(error), 1e-6) << n[0][i] << " " << n[1][i] << " " << n[2][i];
           worst = std::max(worst, std::abs(error));
@@ -68,7 +72,8 @@ TEST(Numerics, FrameIsOrthonormalFromPoleToPole) {
 }
 
 TEST(Numerics, SafeSqrtIsSqrtAboveZeroAndZeroElsewhere) {
-  std::vector<double> x = {0, -0.0, -1e-30, -1, -kInfinity, kNan, 1, 4, 1e-30, 1e30, 3e38, kInfinity};
+  std::vector<double> x = {0, -0.0, -1e-30, -1,   -kInfinity, kNan,
+                           1, 4,    1e-30,  1e30, 3e38,       kInfinity};
   while (x.size() < 1024) x.push_back(static_cast<float>(std::exp2(-120 + 0.24 * x.size())));
   for (const SamplingKernels& kernels : AllSamplingKernels()) {
     SCOPED_TRACE(kernels.name);
@@ -98,7 +103,8 @@ TEST(Numerics, SafeDivIsZeroForDenominatorsNotAboveZero) {
     for (size_t i = 0; i < in[0].size(); ++i) {
       const double a = in[0][i], b = in[1][i];
       double expected = b > 0 ? a / b : 0;
-      if (!kernels.is_double && std::abs(expected) > std::numeric_limits<float>::max()) expected = std::copysign(kInfinity, expected);
+      if (!kernels.is_double && std::abs(expected) > std::numeric_limits<float>::max())
+        expected = std::copysign(kInfinity, expected);
       if (std::isfinite(expected)) {
         EXPECT_NEAR(result[0][i], expected, HalfUlp(expected)) << a << " / " << b;
       } else if (std::isnan(expected)) {
@@ -132,12 +138,14 @@ TEST(Numerics, SafeNormalizeHoldsOverTheWholeRange) {
     for (size_t i = 0; i < in[0].size(); ++i) {
       const double x = in[0][i], y = in[1][i], z = in[2][i];
       const double largest = std::max({std::abs(x), std::abs(y), std::abs(z)});
-      if (i >= bad && !(largest > 1.01e-37 && largest < 0.99e37)) continue;  // either answer is good at the limits
+      if (i >= bad && !(largest > 1.01e-37 && largest < 0.99e37))
+        continue;  // either answer is good at the limits
       const double length = std::sqrt(x * x + y * y + z * z);
       const double expected[] = {x / length, y / length, z / length};
       for (int axis = 0; axis < 3; ++axis) {
         const double fallback = axis == 2 ? 1 : 0;
-        ASSERT_NEAR(out[axis][i], i < bad ? fallback : expected[axis], 3e-7) << x << " " << y << " " << z;
+        ASSERT_NEAR(out[axis][i], i < bad ? fallback : expected[axis], 3e-7)
+            << x << " " << y << " " << z;
       }
     }
   }

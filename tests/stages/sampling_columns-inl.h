@@ -37,8 +37,8 @@ HWY_INLINE void StoreColumn(D d, Real<D> value, std::vector<double>& column, siz
 
 template <class D>
 std::string TagName(D d) {
-  return std::string(hwy::TargetName(HWY_TARGET)) + (sizeof(hn::TFromD<D>) == 8 ? " double x" : " x") +
-         std::to_string(hn::Lanes(d));
+  return std::string(hwy::TargetName(HWY_TARGET)) +
+         (sizeof(hn::TFromD<D>) == 8 ? " double x" : " x") + std::to_string(hn::Lanes(d));
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

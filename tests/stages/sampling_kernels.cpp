@@ -36,7 +36,8 @@ std::vector<double> RunSample1(const Draws& draws) {
   const D d;
   std::vector<double> out(draws.pixel.size());
   for (size_t i = 0; i < out.size(); i += hn::Lanes(d)) {
-    StoreColumn(d, Sample1D(d, KeyOf(d, draws, i), LoadWords(d, draws.vertex, i), draws.purpose), out, i);
+    StoreColumn(d, Sample1D(d, KeyOf(d, draws, i), LoadWords(d, draws.vertex, i), draws.purpose),
+                out, i);
   }
   return out;
 }
@@ -169,7 +170,8 @@ tests::SamplingKernels TableOf(D d) {
 }
 
 std::vector<tests::SamplingKernels> SamplingTables() {
-  return {TableOf(hn::ScalableTag<float>()), TableOf(hn::CappedTag<float, 1>()), TableOf(hn::ScalableTag<double>())};
+  return {TableOf(hn::ScalableTag<float>()), TableOf(hn::CappedTag<float, 1>()),
+          TableOf(hn::ScalableTag<double>())};
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE
@@ -198,7 +200,9 @@ const std::vector<SamplingKernels>& AllSamplingKernels() {
   return all;
 }
 
-const SamplingKernels& BestSamplingKernels() { return AllSamplingKernels().front(); }
+const SamplingKernels& BestSamplingKernels() {
+  return AllSamplingKernels().front();
+}
 
 }  // namespace carpool::tests
 #endif  // HWY_ONCE

@@ -1,4 +1,5 @@
-// The sampling and numeric kernels as plain functions over columns of numbers, for every target and width.
+// The sampling and numeric kernels as plain functions over columns of numbers, for every target and
+// width.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +29,9 @@ struct SamplingKernels {
   std::vector<double> (*sample1)(const Draws&);
   Columns (*sample2)(const Draws&);
   std::vector<double> (*hash)(const Draws&);
-  /// Functions of the columns given: (u, v) -> offset; (u, v) -> direction; (turns) -> cos, sin; (x) -> 2^x - 1;
-  /// normal -> t, b; x -> sqrt; (a, b) -> a / b; vector -> unit vector or (0, 0, 1).
+  /// Functions of the columns given: (u, v) -> offset; (u, v) -> direction; (turns) -> cos, sin;
+  /// (x) -> 2^x - 1; normal -> t, b; x -> sqrt; (a, b) -> a / b; vector -> unit vector or (0, 0,
+  /// 1).
   Columns (*filter)(const Columns&);
   Columns (*cosine)(const Columns&);
   Columns (*cos_sin)(const Columns&);

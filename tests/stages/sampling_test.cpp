@@ -1,4 +1,5 @@
-// The sampler: exact against a plain reference, stratified within a dimension, independent between them.
+// The sampler: exact against a plain reference, stratified within a dimension, independent between
+// them.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -76,7 +77,8 @@ struct Pair {
 Pair Reference(uint32_t pixel, uint32_t sample, uint32_t vertex, Purpose purpose, uint32_t seed) {
   constexpr uint32_t kGolden = 0x9e3779b9u;
   const uint32_t key = Mix(Mix(pixel + Mix(seed + kGolden)) + (sample % 4) * kGolden);
-  const uint32_t hash = Mix(key + (vertex * stages::kPurposesPerVertex + static_cast<uint32_t>(purpose)) * kGolden);
+  const uint32_t hash =
+      Mix(key + (vertex * stages::kPurposesPerVertex + static_cast<uint32_t>(purpose)) * kGolden);
   const auto derive = [&](uint32_t odd) { return (hash * odd) ^ ((hash * odd) >> 16); };
   const uint32_t index = Owen(sample / 4, hash);
   const uint32_t x = Owen(Reverse(index), derive(0x85ebca6bu));
@@ -103,7 +105,8 @@ TEST(Sampler, EveryTargetAndWidthIsTheReference) {
     const std::vector<double> hash = kernels.hash(draws);
     const std::vector<double> first_hash = AllSamplingKernels().front().hash(draws);
     for (size_t i = 0; i < draws.pixel.size(); ++i) {
-      const Pair expected = Reference(draws.pixel[i], draws.sample[i], draws.vertex[i], draws.purpose, draws.seed);
+      const Pair expected =
+          Reference(draws.pixel[i], draws.sample[i], draws.vertex[i], draws.purpose, draws.seed);
       ASSERT_EQ(two[0][i], expected.x) << i;
       ASSERT_EQ(two[1][i], expected.y) << i;
       ASSERT_EQ(one[i], expected.x) << i;
@@ -149,11 +152,12 @@ void ExpectNet(const Columns& points, size_t first, int m, const std::string& wh
 TEST(Sampler, EveryPairIsAZeroMTwoNetInEveryAlignedRun) {
   for (uint32_t pixel = 0; pixel < 12; ++pixel) {
     const auto purpose = static_cast<Purpose>(pixel % 7);
-    const Columns points =
-        BestSamplingKernels().sample2(GroupDraws(pixel * 7919, pixel % 4, pixel / 3, purpose, 4096));
+    const Columns points = BestSamplingKernels().sample2(
+        GroupDraws(pixel * 7919, pixel % 4, pixel / 3, purpose, 4096));
     for (int m = 0; m <= 12; ++m) {
       for (size_t first = 0; first + (size_t{1} << m) <= 4096; first += size_t{1} << m) {
-        ExpectNet(points, first, m, "pixel " + std::to_string(pixel) + " from " + std::to_string(first));
+        ExpectNet(points, first, m,
+                  "pixel " + std::to_string(pixel) + " from " + std::to_string(first));
         if (HasFatalFailure()) return;
         if (first >= (size_t{8} << m)) break;
       }
@@ -162,7 +166,8 @@ TEST(Sampler, EveryPairIsAZeroMTwoNetInEveryAlignedRun) {
 }
 
 TEST(Sampler, OneDimensionalNumbersAreStratified) {
-  const std::vector<double> u = BestSamplingKernels().sample1(GroupDraws(5, 2, 3, Purpose::lobe, 1024));
+  const std::vector<double> u =
+      BestSamplingKernels().sample1(GroupDraws(5, 2, 3, Purpose::lobe, 1024));
   for (size_t first = 0; first < 1024; first += 64) {
     std::vector<int> cells(64, 0);
     for (size_t i = 0; i < 64; ++i) ++cells[static_cast<size_t>(u[first + i] * 64)];
@@ -173,8 +178,10 @@ TEST(Sampler, OneDimensionalNumbersAreStratified) {
 /// p-value of uniformity of pairs over a grid.
 double PairTest(const std::vector<double>& a, const std::vector<double>& b, int grid) {
   std::vector<double> counts(grid * grid, 0);
-  for (size_t i = 0; i < a.size(); ++i) ++counts[static_cast<int>(a[i] * grid) * grid + static_cast<int>(b[i] * grid)];
-  return ChiSquaredTest(counts, std::vector<double>(grid * grid, static_cast<double>(a.size()) / (grid * grid)));
+  for (size_t i = 0; i < a.size(); ++i)
+    ++counts[static_cast<int>(a[i] * grid) * grid + static_cast<int>(b[i] * grid)];
+  return ChiSquaredTest(
+      counts, std::vector<double>(grid * grid, static_cast<double>(a.size()) / (grid * grid)));
 }
 
 constexpr uint32_t kPixels = 1 << 17;
@@ -207,7 +214,8 @@ TEST(Sampler, DigitFlipsOfDimensionsAreIndependent) {
     for (int j = 0; j < 12; ++j) {
       double agree = 0;
       for (uint32_t p = 0; p < kPixels; ++p) {
-        agree += (static_cast<int>(std::ldexp(u[0][p], i + 1)) & 1) == (static_cast<int>(std::ldexp(u[1][p], j + 1)) & 1);
+        agree += (static_cast<int>(std::ldexp(u[0][p], i + 1)) & 1) ==
+                 (static_cast<int>(std::ldexp(u[1][p], j + 1)) & 1);
       }
       const double z = (agree - kPixels / 2.0) / std::sqrt(kPixels / 4.0);
       EXPECT_GT(NormalTail(z), kFalseAlarm / 144) << "digits " << i << ", " << j;
@@ -239,17 +247,21 @@ TEST(Sampler, HashIsUniformAndIndependentOverIterations) {
 
 // A test of the test: correlated numbers must not pass.
 TEST(Sampler, PairTestSeesCorrelation) {
-  const std::vector<double> u = BestSamplingKernels().sample1(PixelDraws(0, 1, Purpose::lobe, kPixels));
+  const std::vector<double> u =
+      BestSamplingKernels().sample1(PixelDraws(0, 1, Purpose::lobe, kPixels));
   std::vector<double> mixed;
-  for (size_t i = 0; i < u.size(); ++i) mixed.push_back(i % 16 == 0 ? u[i] : u[(i * 31) % u.size()]);
+  for (size_t i = 0; i < u.size(); ++i)
+    mixed.push_back(i % 16 == 0 ? u[i] : u[(i * 31) % u.size()]);
   EXPECT_LT(PairTest(u, mixed, 32), kFalseAlarm);
 }
 
-// Integrates x y over the square: 16 scrambles of 4096 samples; plain random numbers would err by 3.4e-3.
+// Integrates x y over the square: 16 scrambles of 4096 samples; plain random numbers would err
+// by 3.4e-3.
 TEST(Sampler, IntegratesSmoothFunctionsFarBetterThanRandomNumbers) {
   double worst = 0;
   for (uint32_t pixel = 0; pixel < 16; ++pixel) {
-    const Columns u = BestSamplingKernels().sample2(GroupDraws(pixel, pixel % 4, 2, Purpose::bsdf, 4096));
+    const Columns u =
+        BestSamplingKernels().sample2(GroupDraws(pixel, pixel % 4, 2, Purpose::bsdf, 4096));
     double sum = 0;
     for (int i = 0; i < 4096; ++i) sum += u[0][i] * u[1][i];
     worst = std::max(worst, std::abs(sum / 4096 - 0.25));
@@ -273,21 +285,24 @@ double MeanSquaredError(uint32_t count, double exact, F f) {
   return sum2 / 16;
 }
 
-// Hard case 46b: no floor, and never slower than random numbers, also across padded dimensions. 16 scrambles
-// know a mean squared error to a factor of 3.
+// Hard case 46b: no floor, and never slower than random numbers, also across padded dimensions. 16
+// scrambles know a mean squared error to a factor of 3.
 TEST(Sampler, ErrorFallsAtLeastAsFastAsWithRandomNumbers) {
   const auto edge = [](double x, double y, double) { return x * x + y * y < 1 ? 1.0 : 0.0; };
   const auto padded = [](double x, double y, double z) { return x + 2 * y < 3 * z ? 1.0 : 0.0; };
   constexpr uint32_t kFew = 1 << 6, kMany = 1 << 18;
   const double edge_few = MeanSquaredError(kFew, std::atan(1.0), edge);
-  EXPECT_LT(MeanSquaredError(kMany, std::atan(1.0), edge), edge_few * kFew / kMany / 8) << "two dimensions of one pair";
+  EXPECT_LT(MeanSquaredError(kMany, std::atan(1.0), edge), edge_few * kFew / kMany / 8)
+      << "two dimensions of one pair";
   const double padded_few = MeanSquaredError(kFew, 0.5, padded);
-  EXPECT_LT(MeanSquaredError(kMany, 0.5, padded), padded_few * kFew / kMany * 3) << "three padded dimensions";
+  EXPECT_LT(MeanSquaredError(kMany, 0.5, padded), padded_few * kFew / kMany * 3)
+      << "three padded dimensions";
 }
 
 TEST(Sampler, DimensionsRepeatPastVertexTwoToTheTwentySeven) {
   Draws draws = GroupDraws(1, 0, 1u << 27, Purpose::lobe, 64);
-  EXPECT_EQ(BestSamplingKernels().sample1(draws), BestSamplingKernels().sample1(GroupDraws(1, 0, 0, Purpose::lobe, 64)));
+  EXPECT_EQ(BestSamplingKernels().sample1(draws),
+            BestSamplingKernels().sample1(GroupDraws(1, 0, 0, Purpose::lobe, 64)));
 }
 
 }  // namespace

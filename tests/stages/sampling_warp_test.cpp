@@ -52,7 +52,8 @@ TEST(Warp, CosSinTurnsIsAccurate) {
 
 TEST(Warp, Exp2Minus1IsAccurateDownToTinyArguments) {
   std::vector<double> x;
-  for (int i = 0; i < 8192; ++i) x.push_back(static_cast<float>(i < 4096 ? i * 29.9 / 4096 : std::exp2(-(i - 4096) / 150.0)));
+  for (int i = 0; i < 8192; ++i)
+    x.push_back(static_cast<float>(i < 4096 ? i * 29.9 / 4096 : std::exp2(-(i - 4096) / 150.0)));
   for (const SamplingKernels& kernels : AllSamplingKernels()) {
     SCOPED_TRACE(kernels.name);
     const Columns result = kernels.exp2_minus1({x});
@@ -92,14 +93,16 @@ TEST(Warp, CosineHemisphereFollowsItsDensity) {
 /// Mass of the Blackman-Harris window below x pixels.
 double FilterMass(double x) {
   const double t = x / stages::kPixelFilterRadius;
-  const double sum = 0.48829 * std::sin(kPi * t) + 0.14128 / 2 * std::sin(2 * kPi * t) + 0.01168 / 3 * std::sin(3 * kPi * t);
+  const double sum = 0.48829 * std::sin(kPi * t) + 0.14128 / 2 * std::sin(2 * kPi * t) +
+                     0.01168 / 3 * std::sin(3 * kPi * t);
   return 0.5 + (0.35875 * t + sum / kPi) / (2 * 0.35875);
 }
 
 TEST(Filter, KnotsInvertTheWindow) {
   const auto& knots = stages::kPixelFilterKnots;
   for (size_t k = 0; k < knots.size(); ++k) {
-    EXPECT_NEAR(FilterMass(knots[k]), static_cast<double>(k) / stages::kPixelFilterCells, 2e-7) << k;
+    EXPECT_NEAR(FilterMass(knots[k]), static_cast<double>(k) / stages::kPixelFilterCells, 2e-7)
+        << k;
     EXPECT_EQ(knots[k], -knots[knots.size() - 1 - k]);
     EXPECT_GT(knots[k], k > 0 ? knots[k - 1] : -2);
   }
@@ -136,10 +139,12 @@ TEST(Filter, SamplesFollowTheWindow) {
       const double edge = ((c + 1) * 2.0 / kCells - 1) * stages::kPixelFilterRadius;
       distance = std::max(distance, std::abs(below / kCount - FilterMass(edge)));
     }
-    // Kolmogorov: exceeded with probability 1e-6 at 2.7 / sqrt(n); cells of 1/256 add at most half of one.
+    // Kolmogorov: exceeded with probability 1e-6 at 2.7 / sqrt(n); cells of 1/256 add at most half
+    // of one.
     EXPECT_LT(distance, 2.7 / std::sqrt(kCount) + 0.5 / stages::kPixelFilterCells);
     EXPECT_LT(std::abs(mean.Value()), 5 * mean.Error());
-    // The window's variance, numerically; equal-mass cells and the flat outermost one change it slightly.
+    // The window's variance, numerically; equal-mass cells and the flat outermost one change it
+    // slightly.
     double variance = 0;
     for (int i = 0; i < 100000; ++i) {
       const double x = ((i + 0.5) / 50000 - 1) * stages::kPixelFilterRadius;
