@@ -47,7 +47,7 @@ void RunQueries(D d, const TextureTablesView& view, const std::vector<TextureQue
       // Inactive lanes hold what the contract allows them to: anything.
       constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
       const TextureQuery query =
-          i < count ? queries[begin + i] : TextureQuery{1 << 30, kNan, -3e38f, 3e38f, -1e30f};
+          i < count ? queries[begin + i] : TextureQuery{0x5000001, kNan, -3e38f, 3e38f, -1e30f};
       slot[i] = query.slot;
       u[i] = query.u;
       v[i] = query.v;
