@@ -186,6 +186,26 @@ TEST(LightTree, NoLightThatContributesIsImpossible) {
   EXPECT_GT(impossible, 20000u);  // and the tree does cull: a third of triangles and most spots
 }
 
+/// Two narrow spots in a row shine along +X; seen from the middle between them, a receiver just
+/// before the first lies towards -X, and yet the first shines on it.
+TEST(LightTree, AClusterAroundTheReceiverIsNeverCulled) {
+  LightScene s;
+  for (const float x : {-1.0f, 1.0f, 1000.0f}) {
+    s.AddPunctual(LightType::spot, {x, 0, 0}, 1);
+    render::PunctualInput& spot = s.punctual.back();
+    spot.direction[0] = 1;
+    spot.direction[2] = 0;
+    spot.inner_cone = 0.05f;
+    spot.outer_cone = 0.1f;
+  }
+  s.Build();
+  LightQuery receiver;
+  receiver.position[0] = -0.5f;
+  for (const LightRunner& runner : AllLightRunners()) {
+    EXPECT_GT(Probabilities(runner, s, receiver)[0], 0.5) << runner.name;
+  }
+}
+
 TEST(LightTree, NearLightsArePreferred) {
   LightScene s;
   for (int i = 0; i < 64; ++i) {
