@@ -61,14 +61,14 @@ std::string Numbers(const ProgressUpdate& u, double phase_start_s) {
   return text;
 }
 
-// The bar takes what the numbers leave of the line; too narrow a terminal gets the numbers alone.
+// The bar takes what the numbers leave of the line; without room or a known fraction there is none.
 std::string BarLine(const ProgressUpdate& u, double phase_start_s, int columns) {
   const std::string word = Print("%-6s", Word(u.phase)), numbers = Numbers(u, phase_start_s);
   const int room = columns - 1 - static_cast<int>(word.size() + numbers.size()) - 3;
   std::string line = word;
-  if (room >= 8) {
+  if (room >= 8 && u.fraction >= 0) {
     const int cells = std::min(room, 40);
-    const int full = static_cast<int>(std::clamp(u.fraction, 0.0, 1.0) * cells);
+    const int full = static_cast<int>(std::min(u.fraction, 1.0) * cells);
     line += " [" + std::string(full, '#') + std::string(cells - full, '.') + "]";
   }
   return (line + numbers).substr(0, std::max(columns - 1, 1));

@@ -147,6 +147,14 @@ TEST(Progress, BarFitsTheTerminal) {
   }
 }
 
+TEST(Progress, NoBarWithoutAKnownFraction) {
+  const Screen screen;
+  ProgressPrinter progress(ProgressStyle::bar, 100, screen.stream());
+  progress({.phase = ProgressPhase::save, .elapsed_s = 3});
+  progress.Finish();
+  EXPECT_EQ(screen.Text(), "save    3.0 s\n");
+}
+
 TEST(Progress, MessageLeavesTheBarWhole) {
   const Screen screen;
   ProgressPrinter progress(ProgressStyle::bar, 100, screen.stream());
