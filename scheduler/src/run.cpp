@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <memory>
+#include <mutex>
 #include <optional>
-#include <stdexcept>
+#include <unordered_map>
 
 #include <tbb/task_arena.h>
 
@@ -62,6 +63,43 @@ struct Destination {
   RunCore* core;
 };
 
+// PostOffice keeps destinations alive while invitations to them are under way. They could do that
+// themselves, but those that the process ends before would look like leaks, because leak checkers
+// cannot see into oneTBB's memory.
+class PostOffice {
+ public:
+  // The one office is never destroyed: oneTBB's threads may outlive what has static lifetime.
+  static PostOffice& instance() {
+    static PostOffice* const office = std::make_unique<PostOffice>().release();
+    return *office;
+  }
+
+  void send(const std::shared_ptr<const Destination>& to) {
+    const std::lock_guard guard(lock_);
+    Entry& entry = under_way_[to.get()];
+    entry.to = to;
+    ++entry.count;
+  }
+
+  std::shared_ptr<const Destination> receive(const Destination* to) {
+    const std::lock_guard guard(lock_);
+    const auto at = under_way_.find(to);
+    std::shared_ptr<const Destination> result = at->second.to;
+    if (--at->second.count == 0) {
+      under_way_.erase(at);
+    }
+    return result;
+  }
+
+ private:
+  struct Entry {
+    std::shared_ptr<const Destination> to;
+    std::size_t count = 0;
+  };
+  std::mutex lock_;
+  std::unordered_map<const Destination*, Entry> under_way_;
+};
+
 // oneTBB is not instrumented for the thread sanitizer, which therefore cannot see that functors are
 // handed from thread to thread properly. These two functions tell it; elsewhere they are nothing.
 #ifdef CARPOOL_TSAN
@@ -95,15 +133,14 @@ void serve_isolated(RunCore& core, bool searching) {
 // the arena's slot.
 class Invitation {
  public:
-  explicit Invitation(std::shared_ptr<const Destination> to) : to_(std::move(to)) { hand_over(); }
+  explicit Invitation(const Destination* to) : to_(to) { hand_over(); }
   Invitation(const Invitation& other) : to_(other.to_) { hand_over(); }
-  Invitation(Invitation&& other) noexcept : to_(std::move(other.to_)) { hand_over(); }
   Invitation& operator=(const Invitation&) = delete;
   ~Invitation() = default;
 
   void operator()() const {
     receive();
-    const std::shared_ptr<const Destination> to = to_;
+    const std::shared_ptr<const Destination> to = PostOffice::instance().receive(to_);
     if (!to->gate->enter()) {
       return;
     }
@@ -114,7 +151,7 @@ class Invitation {
 
  private:
   Custody custody_;  // first: made before and destroyed after the pointer
-  std::shared_ptr<const Destination> to_;
+  const Destination* to_;
 };
 
 class ThreadedRun final : private Summoner {
@@ -145,7 +182,10 @@ class ThreadedRun final : private Summoner {
   }
 
  private:
-  void summon() override { arena_.enqueue(Invitation(destination_)); }
+  void summon() override {
+    PostOffice::instance().send(destination_);
+    arena_.enqueue(Invitation(destination_.get()));
+  }
 
   tbb::task_arena& arena_;
   RunCore core_;

@@ -6,17 +6,18 @@
 namespace carpool_test {
 
 namespace {
-constexpr std::size_t kMostWorkers = 128;
+constexpr std::size_t kMostWorkers = 256;
 }
 
 RandomGraph::RandomGraph(const Shape& shape)
     : shape_(shape),
       next_(std::make_unique<std::atomic<std::uint64_t>[]>(shape.sources)),
       counts_(kMostWorkers) {
+  shape_.explicit_weights = shape.explicit_weights && shape.stages > 1;
   for (std::uint32_t s = 0; s < shape.stages; ++s) {
     const std::uint64_t dice = mix(shape.seed * 1000 + s);
     const auto bins = static_cast<std::uint32_t>(1 + dice % shape.most_bins);
-    const bool narrow = shape.explicit_weights && s + 1 == shape.stages;
+    const bool narrow = shape_.explicit_weights && s + 1 == shape.stages;
     bins_.push_back(bins);
     stages_.push_back(graph_.add_stage<Item>({.name = std::string("s").append(std::to_string(s)),
                                               .bins = bins,
