@@ -51,7 +51,7 @@ void ApplyMorph(const Document& document, const Json& json, const std::vector<do
 
 /// The blended joint matrix of each vertex; weights are made to sum to 1.
 std::vector<Affine> BlendJoints(const Document& document, const Json& json,
-                                const std::vector<Affine>& joints, uint64_t vertex_count,
+                                std::span<const Affine> joints, uint64_t vertex_count,
                                 const Primitive& primitive) {
   std::vector<Affine> blends(primitive.vertex_count(), Affine{});
   std::vector<double> sums(primitive.vertex_count(), 0.0);
@@ -87,7 +87,7 @@ std::vector<Affine> BlendJoints(const Document& document, const Json& json,
   return blends;
 }
 
-void ApplySkin(const Document& document, const Json& json, const std::vector<Affine>& joints,
+void ApplySkin(const Document& document, const Json& json, std::span<const Affine> joints,
                uint64_t vertex_count, Primitive& primitive) {
   const std::vector<Affine> blends = BlendJoints(document, json, joints, vertex_count, primitive);
   for (size_t v = 0; v < blends.size(); ++v) {

@@ -1,6 +1,7 @@
 // Morph targets and skins in the file's rest pose: vertices are moved once, at import.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "render/gltf/primitive.h"
@@ -9,8 +10,8 @@ namespace carpool::render::gltf {
 
 /// How one node bends the mesh it shows. Both lists may be empty.
 struct Deform {
-  std::vector<double> weights;  // one per morph target
-  std::vector<Affine> joints;   // mesh space to skinned space, per joint of the skin
+  std::vector<double> weights;     // one per morph target
+  std::span<const Affine> joints;  // mesh space to skinned space, per joint of the skin
 
   bool empty() const { return weights.empty() && joints.empty(); }
 };

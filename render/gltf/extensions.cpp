@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <string_view>
 #include <vector>
 
@@ -73,9 +74,11 @@ bool IsSupportedExtension(const std::string& name) {
 
 void CheckExtensions(Document& document) {
   const Json& required = document.Items("extensionsRequired");
+  std::set<std::string>
+      seen;  // a name may be repeated any number of times, and IsCarried() reads all
   for (size_t i = 0; i < required.size(); ++i) {
     const std::string name = required[i];
-    if (IsSupportedExtension(name)) continue;
+    if (IsSupportedExtension(name) || !seen.insert(name).second) continue;
     const std::string pointer = Pointer("extensionsRequired", i);
     if (!IsProvablyUnused(document, name)) {
       document.Fail(pointer, "the file requires extension " + Quoted(name) +

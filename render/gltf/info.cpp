@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <map>
+#include <string_view>
 
 #include "render/gltf/extensions.h"
 #include "render/gltf/lights_cameras.h"
@@ -12,18 +14,20 @@ namespace carpool::render {
 namespace gltf {
 namespace {
 
-void AddExtensions(const Document& document, const char* key, bool required,
-                   std::vector<ExtensionUse>& out) {
-  for (const Json& item : document.Items(key)) {
-    const std::string name = item;
-    const auto found = std::find_if(out.begin(), out.end(),
-                                    [&](const ExtensionUse& use) { return use.name == name; });
-    if (found != out.end()) {
-      found->required |= required;
-    } else {
-      out.push_back({name, required, IsSupportedExtension(name)});
+/// All extensions that the file names, each once, in the file's order.
+std::vector<ExtensionUse> ListExtensions(const Document& document) {
+  std::vector<ExtensionUse> out;
+  std::map<std::string, size_t> place;
+  for (const char* key : {"extensionsUsed", "extensionsRequired"}) {
+    const bool required = key == std::string_view("extensionsRequired");
+    for (const Json& item : document.Items(key)) {
+      const std::string name = item;
+      const auto [found, is_new] = place.try_emplace(name, out.size());
+      if (is_new) out.push_back({name, false, IsSupportedExtension(name)});
+      out[found->second].required |= required;
     }
   }
+  return out;
 }
 
 void CountMeshes(const Document& document, SceneSummary& summary) {
@@ -113,8 +117,7 @@ SceneSummary Summarize(const Document& document) {
   summary.lights = CountLights(document);
   summary.animations = document.Items("animations").size();
   summary.skins = document.Items("skins").size();
-  AddExtensions(document, "extensionsUsed", false, summary.extensions);
-  AddExtensions(document, "extensionsRequired", true, summary.extensions);
+  summary.extensions = ListExtensions(document);
   return summary;
 }
 

@@ -72,8 +72,8 @@ void KeepUsedVertices(uint64_t vertex_count, Primitive& primitive) {
   }
 }
 
-/// An attribute of the vertices in use, with `components` floats each (0: as many as it has); empty
-/// where the primitive lacks it.
+/// An attribute of the vertices in use, with `components` floats each; empty where the primitive
+/// lacks it.
 std::vector<float> ReadAttribute(const Document& document, const Json& json,
                                  const std::string& name, uint64_t vertex_count,
                                  const Primitive& primitive, int components) {
