@@ -46,6 +46,7 @@ std::vector<std::byte> ReadFile(const std::filesystem::path& path, const std::st
   }
   const uint64_t wanted = std::min(size, at_most);
   budget.Take(wanted, where);
+  budget.read += wanted;
   std::vector<std::byte> bytes(wanted);
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(wanted));
   if (static_cast<uint64_t>(stream.gcount()) != wanted) {

@@ -15,6 +15,7 @@ namespace carpool::render::gltf {
 struct ByteBudget {
   uint64_t left = std::numeric_limits<uint64_t>::max();
   uint64_t taken = 0;
+  uint64_t read = 0;  // of `taken`, what came from files rather than from copies within them
 
   /// Take() subtracts, or throws InputError where less is left.
   void Take(uint64_t bytes, const std::string& where);

@@ -43,7 +43,7 @@ ImportedScene Import(const std::filesystem::path& path, const LoadOptions& optio
   scene.summary = Summarize(document);
   scene.summary.scene = tree.scene;
   scene.summary.triangles_drawn = CountDrawn(geometry);
-  scene.summary.file_bytes = document.budget.taken;
+  scene.summary.file_bytes = document.budget.read;
   for (const Json& node : document.Items("nodes"))
     scene.node_names.push_back(Get<std::string>(node, "name", ""));
   scene.geometry = std::move(geometry.tables);

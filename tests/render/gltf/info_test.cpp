@@ -20,7 +20,10 @@ SceneBuilder Everything() {
   scene.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 1}}}}};
   scene.AddNode(
       {{"camera", 0}, {"name", "eye"}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
-  scene.json["materials"] = {{{"emissiveFactor", {1, 1, 1}}}, Json::object()};
+  scene.json["materials"] = {{{"emissiveFactor", {1, 1, 1}}, {"emissiveTexture", {{"index", 0}}}},
+                             Json::object()};
+  scene.json["textures"] = {{{"source", 0}}};
+  scene.json["images"] = {{{"bufferView", scene.AddView(TinyPng())}}};
   scene.json["animations"] = {Json::object()};
   return scene;
 }
