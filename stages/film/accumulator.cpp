@@ -13,14 +13,31 @@ T FetchAdd(T& cell, T value) {
   return std::atomic_ref<T>(cell).fetch_add(value, std::memory_order_relaxed);
 }
 
-int64_t ToFixed(double value) { return std::llrint(value / kFilmQuantum); }
+int64_t ToFixed(double value) { return std::llrint(value * (1 / kFilmQuantum)); }
 
 void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
-  if (value == 0) return;
   const uint64_t bits = static_cast<uint64_t>(value);
-  const uint64_t old = FetchAdd(low, bits);
-  const int carry = (old + bits < old ? 1 : 0) + (value < 0 ? -1 : 0);
-  if (carry != 0) FetchAdd(high, static_cast<int16_t>(carry));
+  const uint64_t old = low;
+  low = old + bits;
+  high = static_cast<int16_t>(high + (low < old ? 1 : 0) + (value < 0 ? -1 : 0));
+}
+
+// The top bit of a pixel's sample count is its lock: one atomic exchange instead of four atomic sums. Two
+// threads meet on one pixel almost never, and then for a few nanoseconds.
+constexpr uint32_t kLocked = 1u << 31;
+
+/// Returns the sample count.
+uint32_t Lock(FilmPixel& pixel) {
+  std::atomic_ref<uint32_t> state(pixel.samples);
+  for (;;) {
+    const uint32_t seen = state.fetch_or(kLocked, std::memory_order_acquire);
+    if ((seen & kLocked) == 0) return seen;
+    while ((state.load(std::memory_order_relaxed) & kLocked) != 0) {
+    }
+  }
+}
+void Unlock(FilmPixel& pixel, uint32_t samples) {
+  std::atomic_ref<uint32_t>(pixel.samples).store(samples, std::memory_order_release);
 }
 
 }  // namespace
@@ -42,19 +59,22 @@ uint64_t FilmAccumulator::bytes() const {
 }
 
 void FilmAccumulator::Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
-  FilmPixel& p = pixels_[pixel];
   const int first = static_cast<int>(sample % kScrambles) * 3;
   bool rejected = false;
+  int64_t fixed[3];
   for (int c = 0; c < 3; ++c) {
     double value = radiance[c];
     if (!(std::abs(value) <= kFilmLargest)) {  // also NaN
       rejected = true;
       value = std::isfinite(value) ? std::copysign(kFilmLargest, value) : 0;
     }
-    AddFixed(p.low[first + c], p.high[first + c], ToFixed(value));
+    fixed[c] = ToFixed(value);
   }
-  if (rejected) FetchAdd(p.rejected, 1u);
-  FetchAdd(p.samples, 1u);
+  FilmPixel& p = pixels_[pixel];
+  const uint32_t samples = Lock(p);
+  for (int c = 0; c < 3; ++c) AddFixed(p.low[first + c], p.high[first + c], fixed[c]);
+  p.rejected += rejected ? 1 : 0;
+  Unlock(p, samples + 1);
 }
 
 void FilmAccumulator::AddFirstHit(uint32_t pixel, uint32_t sample, const FirstHit& hit) {

@@ -18,7 +18,7 @@ constexpr double kFilmLargest = 0x1p31;   // a sample's channel above this is cl
 struct alignas(64) FilmPixel {
   uint64_t low[kScrambles * 3];
   int16_t high[kScrambles * 3];
-  uint32_t samples;
+  uint32_t samples;   // below 2^31: the top bit is a lock while a sample is being added
   uint32_t rejected;  // samples that were not finite (counted as 0) or were clamped to the range
 };
 static_assert(sizeof(FilmPixel) == 128);
@@ -55,6 +55,11 @@ class FilmAccumulator {
   /// Adds one sample of `pixel` (y * width + x). Non-finite channels count as 0, oversized ones as the
   /// largest; either is counted in `rejected`.
   void Add(uint32_t pixel, uint32_t sample, const float radiance[3]);
+  /// Asks for the pixel's cache lines ahead of Add.
+  void Prefetch(uint32_t pixel) const {
+    __builtin_prefetch(&pixels_[pixel], 1);
+    __builtin_prefetch(&pixels_[pixel].high, 1);
+  }
 
   /// Adds what sample `sample` of `pixel` saw first; ids and depth are kept of sample 0 alone.
   void AddFirstHit(uint32_t pixel, uint32_t sample, const FirstHit& hit);

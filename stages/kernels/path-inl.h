@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include "stages/simd/lanes-inl.h"
+#include "stages/simd/quads-inl.h"
 #include "stages/tables/path.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -52,6 +53,12 @@ HWY_INLINE Int<D> PathInt(D d, const PathLanes<D>& p, size_t offset) {
 template <class D>
 HWY_INLINE Vec3<D> PathVec3(D d, const PathLanes<D>& p, size_t offset) {
   return FieldVec3<PathState>(d, p.paths, p.slot, offset);
+}
+
+/// Four neighbouring words, from a multiple of 16 bytes: one load per path and a transposition.
+template <class D>
+HWY_INLINE Quad<D> PathQuad(D d, const PathLanes<D>& p, size_t offset) {
+  return FieldQuad(d, p.paths, p.slot, offset);
 }
 
 /// The lanes of a mask, as a list to loop over.
@@ -95,6 +102,22 @@ HWY_INLINE void StoreVec3(D d, const LaneList<D>& list, size_t offset, const Vec
   StoreWord(d, list, offset, value.x);
   StoreWord(d, list, offset + 4, value.y);
   StoreWord(d, list, offset + 8, value.z);
+}
+
+/// Writes four neighbouring words, from a multiple of 16 bytes, of each listed path.
+template <class D, class X, class Y, class Z, class W>
+HWY_INLINE void StoreQuad(D d, const LaneList<D>& list, size_t offset, X x, Y y, Z z, W w) {
+  constexpr size_t kLanes = LaneList<D>::kLanes;
+  HWY_ALIGN float words[4][kLanes];
+  hn::Store(hn::BitCast(d, x), d, words[0]);
+  hn::Store(hn::BitCast(d, y), d, words[1]);
+  hn::Store(hn::BitCast(d, z), d, words[2]);
+  hn::Store(hn::BitCast(d, w), d, words[3]);
+  for (size_t i = 0; i < list.count; ++i) {
+    const size_t lane = list.lane[i];
+    const float four[4] = {words[0][lane], words[1][lane], words[2][lane], words[3][lane]};
+    std::memcpy(reinterpret_cast<char*>(list.path[i]) + offset, four, 16);
+  }
 }
 
 /// Unit vector to 2 x 16 bit octahedral coordinates (Cigolle et al. 2014) and back. Selection of lights

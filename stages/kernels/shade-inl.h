@@ -45,7 +45,8 @@ struct Vertex {
   SurfacePoint<D> at;
   Surface<D> surface;
   TextureFootprint<D> footprint;
-  Real<D> cone_width;       // of the ray cone, here
+  Real<D> cone_width;       // of the ray cone, here ...
+  Real<D> cone_spread;      // ... and its growth per metre on the way
   Vec3<D> toward;           // to the previous vertex
   Vec3<D> ray_origin;
   Real<D> ray_pdf;
@@ -57,28 +58,33 @@ struct Vertex {
 template <class D>
 HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>& p) {
   const UintTag<D> du;
+  const IntTag<D> di;
+  const Quad<D> origin = PathQuad(d, p, offsetof(PathState, origin));        // and tnear
+  const Quad<D> ray = PathQuad(d, p, offsetof(PathState, direction));        // and pdf
+  const Quad<D> through = PathQuad(d, p, offsetof(PathState, throughput));   // and cone_width
+  const Quad<D> gathered = PathQuad(d, p, offsetof(PathState, radiance));    // and cone_spread
+  const Quad<D> names = PathQuad(d, p, offsetof(PathState, pixel));          // pixel, sample, flags, placement
+  const Quad<D> hit = PathQuad(d, p, offsetof(PathState, primitive));        // primitive, u, v, distance
   Vertex<D> v;
   v.path = p;
-  v.flags = hn::BitCast(du, PathInt(d, p, offsetof(PathState, flags)));
+  v.flags = hn::BitCast(du, names.z);
   v.depth = hn::And(v.flags, hn::Set(du, kPathDepthMask));
   v.number = v.depth + hn::Set(du, 1);
-  v.key = MakeSampleKey(d, hn::BitCast(du, PathInt(d, p, offsetof(PathState, pixel))),
-                        hn::BitCast(du, PathInt(d, p, offsetof(PathState, sample))), c.seed);
-  v.ray_origin = PathVec3(d, p, offsetof(PathState, origin));
-  v.ray_pdf = PathReal(d, p, offsetof(PathState, pdf));
-  v.distance = PathReal(d, p, offsetof(PathState, distance));
-  v.throughput = PathVec3(d, p, offsetof(PathState, throughput));
-  v.radiance = PathVec3(d, p, offsetof(PathState, radiance));
-  const Vec3<D> direction = PathVec3(d, p, offsetof(PathState, direction));
+  v.key = MakeSampleKey(d, hn::BitCast(du, names.x), hn::BitCast(du, names.y), c.seed);
+  v.ray_origin = {origin.x, origin.y, origin.z};
+  v.ray_pdf = ray.w;
+  v.distance = hit.w;
+  v.throughput = {through.x, through.y, through.z};
+  v.radiance = {gathered.x, gathered.y, gathered.z};
+  v.cone_spread = gathered.w;
+  const Vec3<D> direction = {ray.x, ray.y, ray.z};
   v.toward = Neg<D>(direction);
 
-  v.primitive = PathInt(d, p, offsetof(PathState, primitive));
-  v.at = MakeSurfacePoint(d, c, PathInt(d, p, offsetof(PathState, placement)), v.primitive,
-                          PathReal(d, p, offsetof(PathState, u)), PathReal(d, p, offsetof(PathState, v)));
-  v.surface = MakeSurface(d, c, v.at, v.primitive, direction);
+  v.primitive = hn::BitCast(di, hit.x);
+  v.at = MakeSurfacePoint(d, c, hn::BitCast(di, names.w), v.primitive, hit.y, hit.z);
+  v.surface = MakeSurface(d, c, v.at, direction);
 
-  v.cone_width = hn::MulAdd(PathReal(d, p, offsetof(PathState, cone_spread)), v.distance,
-                            PathReal(d, p, offsetof(PathState, cone_width)));
+  v.cone_width = hn::MulAdd(v.cone_spread, v.distance, through.w);
   v.footprint.uv = TextureCoordinates(d, c, v.at, hn::Zero(IntTag<D>()));
   // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter takes
   // care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and blur).
@@ -91,14 +97,14 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
 /// Lanes that go straight on: transparent by chance of their alpha, or seen from behind by the camera
 /// where the material is single-sided. (Later rays see both sides: a wall must not leak light.)
 template <class D>
-HWY_INLINE Mask<D> PassesThrough(D d, const KernelContext& c, const Vertex<D>& v, Real<D> alpha,
+HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha,
                                  Mask<D> active) {
   const UintTag<D> du;
   const Uint<D> layers = hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
   const Real<D> u = HashUniform(d, v.key, v.number, Purpose::alpha, layers);
-  const Mask<D> transparent = hn::Ge(u, Opacity(d, c, v.at, alpha));
+  const Mask<D> transparent = hn::Ge(u, Opacity(d, v.at, alpha));
   const Mask<D> camera_ray = hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(du)));
-  const Mask<D> double_sided = MaterialHas(d, c, v.at.material, kMaterialDoubleSided);
+  const Mask<D> double_sided = MaterialHas(d, v.at.material, kMaterialDoubleSided);
   const Mask<D> culled = hn::And(hn::AndNot(double_sided, v.surface.back), camera_ray);
   return hn::And(active, hn::Or(transparent, culled));
 }
@@ -146,21 +152,21 @@ HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v, 
 /// Emission of the surface that was hit, weighted against light sampling from the previous vertex.
 template <class D>
 HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> active) {
-  const Mask<D> front = hn::Or(hn::Not(v.surface.back), MaterialHas(d, c, v.at.material, kMaterialDoubleSided));
-  active = hn::And(hn::And(active, front), MaterialHas(d, c, v.at.material, kMaterialEmissive));
+  const Mask<D> front = hn::Or(hn::Not(v.surface.back), MaterialHas(d, v.at.material, kMaterialDoubleSided));
+  active = hn::And(hn::And(active, front), MaterialHas(d, v.at.material, kMaterialEmissive));
   if (hn::AllFalse(d, active)) return;
 
   const Vec3<D> emitted = EmittedRadiance(d, c, v.at, v.footprint.uv, active);
   Real<D> weight = Splat(d, 1);
   const IntTag<D> di;
-  const Int<D> first_light = FieldInt(d, c.geometry.placements, v.at.placement, offsetof(Placement, first_light));
+  const Int<D> first_light = FieldInt(d, v.at.placement, offsetof(Placement, first_light));
   const Mask<D> sampled =
       hn::And(hn::And(active, IsPresent(d, first_light)), hn::Gt(v.ray_pdf, hn::Zero(d)));
   if (!hn::AllFalse(d, sampled)) {
     const Int<D> light = hn::IfThenElseZero(hn::RebindMask(di, sampled), first_light + v.primitive);
     const Vec3<D> normal =
         DecodeNormal(d, hn::BitCast(UintTag<D>(), PathInt(d, v.path, offsetof(PathState, normal))));
-    const Triangle<D> t = TriangleVertices(d, c.geometry, v.at.placement, v.primitive);
+    const Triangle<D>& t = v.surface.triangle;
     const Real<D> pdf = lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
                                                t.p1, t.p2, Neg<D>(v.toward), v.distance);
     weight = hn::IfThenElse(sampled, PowerHeuristic(d, v.ray_pdf, pdf), weight);
@@ -172,7 +178,7 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> a
 template <class D>
 HWY_INLINE SurfaceParams<D> MaterialParams(D d, const KernelContext& c, const Vertex<D>& v,
                                            const Vec3<D>& base_color, Mask<D> active) {
-  const auto factor = [&](size_t offset) HWY_ATTR { return FieldReal(d, c.materials, v.at.material, offset); };
+  const auto factor = [&](size_t offset) HWY_ATTR { return FieldReal(d, v.at.material, offset); };
   const Rgba<D> mr = MaterialTexture(d, c, v.at, v.footprint, Slot::metallic_roughness, active, 1);
   const Rgba<D> specular = MaterialTexture(d, c, v.at, v.footprint, Slot::specular, active, 1);
   const Rgba<D> tint = MaterialTexture(d, c, v.at, v.footprint, Slot::specular_color, active, 1);
@@ -181,10 +187,10 @@ HWY_INLINE SurfaceParams<D> MaterialParams(D d, const KernelContext& c, const Ve
   params.metallic = factor(offsetof(Material, metallic)) * mr.rgb.z;
   params.roughness = factor(offsetof(Material, roughness)) * mr.rgb.y;
   params.ior = factor(offsetof(Material, ior));
-  params.ior_zero = MaterialHas(d, c, v.at.material, kMaterialIorZero);
+  params.ior_zero = MaterialHas(d, v.at.material, kMaterialIorZero);
   params.specular = factor(offsetof(Material, specular)) * specular.a;
   params.specular_color = Mul<D>(
-      FieldVec3(d, c.materials, v.at.material, offsetof(Material, specular_color)), tint.rgb);
+      FieldVec3(d, v.at.material, offsetof(Material, specular_color)), tint.rgb);
   return params;
 }
 
@@ -299,28 +305,26 @@ HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s, const 
   const UintTag<D> du;
   const Real<D> zero = hn::Zero(d);
   const LaneList<D> list = ListLanes(d, v.path, lanes);
-  StoreVec3(d, list, offsetof(PathState, radiance), v.radiance);
   if (hn::AllFalse(d, hn::Or(shadow.wanted, bounce.alive))) {
+    StoreVec3(d, list, offsetof(PathState, radiance), v.radiance);
     for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
     return;
   }
   // Beyond a rough bounce the cone widens by roughly the lobe's width, whose solid angle is about 1 / pdf.
   const Real<D> lobe = hn::Min(Splat(d, 0.25) / hn::Sqrt(hn::Max(bounce.pdf, Splat(d, 1e-6))), Splat(d, 0.5));
-  const Real<D> spread = PathReal(d, v.path, offsetof(PathState, cone_spread)) + lobe;
   const Uint<D> flags = hn::Or(v.depth + hn::Set(du, 1),
                                hn::IfThenElseZero(hn::RebindMask(du, bounce.alive), hn::Set(du, kPathAlive)));
-  StoreVec3(d, list, offsetof(PathState, origin), s.origin);
-  StoreWord(d, list, offsetof(PathState, tnear), zero);
-  StoreVec3(d, list, offsetof(PathState, direction), bounce.direction);
-  StoreWord(d, list, offsetof(PathState, pdf), bounce.pdf);
-  StoreVec3(d, list, offsetof(PathState, throughput), bounce.throughput);
-  StoreWord(d, list, offsetof(PathState, cone_width), v.cone_width);
-  StoreWord(d, list, offsetof(PathState, cone_spread), spread);
+  const Real<D> shadow_distance = hn::IfThenElseZero(shadow.wanted, shadow.distance);
+  StoreQuad(d, list, offsetof(PathState, origin), s.origin.x, s.origin.y, s.origin.z, zero);
+  StoreQuad(d, list, offsetof(PathState, direction), bounce.direction.x, bounce.direction.y, bounce.direction.z, bounce.pdf);
+  StoreQuad(d, list, offsetof(PathState, throughput), bounce.throughput.x, bounce.throughput.y, bounce.throughput.z,
+            v.cone_width);
+  StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z, v.cone_spread + lobe);
   StoreWord(d, list, offsetof(PathState, flags), flags);
-  StoreVec3(d, list, offsetof(PathState, shadow_direction), shadow.direction);
-  StoreWord(d, list, offsetof(PathState, shadow_distance), hn::IfThenElseZero(shadow.wanted, shadow.distance));
-  StoreVec3(d, list, offsetof(PathState, shadow_radiance), shadow.radiance);
-  StoreWord(d, list, offsetof(PathState, normal), s.packed_normal);
+  StoreQuad(d, list, offsetof(PathState, shadow_direction), shadow.direction.x, shadow.direction.y, shadow.direction.z,
+            shadow_distance);
+  StoreQuad(d, list, offsetof(PathState, shadow_radiance), shadow.radiance.x, shadow.radiance.y, shadow.radiance.z,
+            s.packed_normal);
   for (size_t i = 0; i < list.count; ++i) {
     const PathState& path = *list.path[i];
     const bool alive = (path.flags & kPathAlive) != 0;
@@ -341,7 +345,7 @@ HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p,
   Vertex<D> v = LoadVertex(d, c, p);
   const Rgba<D> base = BaseColor(d, c, v.at, v.footprint, p.active);
 
-  const Mask<D> passes = PassesThrough(d, c, v, base.a, p.active);
+  const Mask<D> passes = PassesThrough(d, v, base.a, p.active);
   if (!hn::AllFalse(d, passes)) ContinueThrough(d, v, passes, next);
   Mask<D> active = hn::AndNot(passes, p.active);
   if (hn::AllFalse(d, active)) return;
@@ -350,7 +354,7 @@ HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p,
   v.surface.shading = FaceViewer(d, v.surface.shading, v.toward);
   if (c.first_hits) RecordFirstHit(d, c, v, base.rgb, v.surface.shading, active);
 
-  const Mask<D> unlit = hn::And(active, MaterialHas(d, c, v.at.material, kMaterialUnlit));
+  const Mask<D> unlit = hn::And(active, MaterialHas(d, v.at.material, kMaterialUnlit));
   v.radiance = Select<D>(unlit, Add<D>(v.radiance, Mul<D>(v.throughput, base.rgb)), v.radiance);
   AddEmission(d, c, v, hn::AndNot(unlit, active));
 
@@ -378,15 +382,12 @@ HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
   const Vec3<D> direction = PathVec3(d, p, offsetof(PathState, direction));
   const Real<D> pdf = PathReal(d, p, offsetof(PathState, pdf));
   const Mask<D> bounced = hn::Gt(pdf, hn::Zero(d));
-  Real<D> weight = Splat(d, 1);
-  if (!hn::AllFalse(d, bounced)) {
-    const Real<D> light_pdf = lights::LightPdfForEnvironment(d, c.lights, direction);
-    weight = hn::IfThenElse(bounced, PowerHeuristic(d, pdf, light_pdf), weight);
-  }
+  const EnvironmentValue<D> environment = LookUpEnvironment(d, c.lights.environment, direction);
+  const Real<D> light_pdf = environment.pdf * Splat(d, c.lights.environment_probability);
+  const Real<D> weight = hn::IfThenElse(bounced, PowerHeuristic(d, pdf, light_pdf), Splat(d, 1));
   const Vec3<D> throughput = PathVec3(d, p, offsetof(PathState, throughput));
-  const Vec3<D> environment = lights::EnvironmentRadiance(d, c.lights.environment, direction);
   const Vec3<D> sum = Add<D>(PathVec3(d, p, offsetof(PathState, radiance)),
-                             Scale(Mul<D>(throughput, environment), weight));
+                             Scale(Mul<D>(throughput, environment.radiance), weight));
   StoreVec3(d, ListLanes(d, p, p.active), offsetof(PathState, radiance), sum);
 }
 
@@ -400,7 +401,7 @@ HWY_INLINE Real<D> PointOpacity(D d, const KernelContext& c, int32_t placement, 
                                               Splat(d, u), Splat(d, v));
   const TextureFootprint<D> finest = {TextureCoordinates(d, c, at, hn::Zero(di)), Splat(d, -100), hn::Zero(d)};
   const Mask<D> all = hn::FirstN(d, hn::Lanes(d));
-  return Opacity(d, c, at, BaseColor(d, c, at, finest, all).a);
+  return Opacity(d, at, BaseColor(d, c, at, finest, all).a);
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

@@ -19,7 +19,8 @@ namespace carpool::stages::HWY_NAMESPACE {
 /// A point on a triangle of the scene, by barycentrics of vertices 1 and 2.
 template <class D>
 struct SurfacePoint {
-  Int<D> placement, material;
+  Records<Placement, D> placement;
+  Records<Material, D> material;
   TriangleIndices<D> index;
   Real<D> b0, b1, b2;
 };
@@ -28,13 +29,16 @@ template <class D>
 HWY_INLINE SurfacePoint<D> MakeSurfacePoint(D d, const KernelContext& c, Int<D> placement,
                                             Int<D> primitive, Real<D> b1, Real<D> b2) {
   const Real<D> b0 = hn::Max(Splat(d, 1) - b1 - b2, hn::Zero(d));
-  return {placement, FieldInt(d, c.geometry.placements, placement, offsetof(Placement, material)),
-          GatherTriangleIndices(d, c.geometry, placement, primitive), b0, b1, b2};
+  const Records<Placement, D> record = MakeRecords(d, c.geometry.placements, placement);
+  return {record,
+          MakeRecords(d, c.materials, FieldInt(d, record, offsetof(Placement, material))),
+          GatherTriangleIndices(d, c.geometry, record, primitive), b0, b1, b2};
 }
 
 /// The shape of the surface at a hit. Normals face the side that the ray came from.
 template <class D>
 struct Surface {
+  Triangle<D> triangle;
   Vec3<D> position;     // recomputed from barycentrics
   Vec3<D> error;        // componentwise bound on its distance to the triangle that Embree sees
   Vec3<D> geometric;    // unit normal of the triangle
@@ -62,24 +66,24 @@ HWY_INLINE Mask<D> IsPresent(D d, Int<D> offset) {
 
 /// Normals of object space to world space, unnormalised; outward stays outward under mirroring.
 template <class D>
-HWY_INLINE Vec3<D> NormalToWorld(D d, const GeometryView& g, Int<D> placement, const Vec3<D>& n) {
+HWY_INLINE Vec3<D> NormalToWorld(D d, const Records<Placement, D>& placement, const Vec3<D>& n) {
   const auto row = [&](size_t i) HWY_ATTR {
-    return Dot(FieldVec3(d, g.placements, placement, offsetof(Placement, normal_to_world) + 12 * i), n);
+    return Dot(FieldVec3(d, placement, offsetof(Placement, normal_to_world) + 12 * i), n);
   };
   return {row(0), row(1), row(2)};
 }
 
 template <class D>
-HWY_INLINE Vec3<D> VectorToWorld(D d, const GeometryView& g, Int<D> placement, const Vec3<D>& v) {
+HWY_INLINE Vec3<D> VectorToWorld(D d, const Records<Placement, D>& placement, const Vec3<D>& v) {
   const auto row = [&](size_t i) HWY_ATTR {
-    return Dot(FieldVec3(d, g.placements, placement, offsetof(Placement, object_to_world) + 16 * i), v);
+    return Dot(FieldVec3(d, placement, offsetof(Placement, object_to_world) + 16 * i), v);
   };
   return {row(0), row(1), row(2)};
 }
 
 template <class D>
-HWY_INLINE Mask<D> PlacementHas(D d, const GeometryView& g, Int<D> placement, int32_t flag) {
-  const Int<D> flags = FieldInt(d, g.placements, placement, offsetof(Placement, flags));
+HWY_INLINE Mask<D> PlacementHas(D d, const Records<Placement, D>& placement, int32_t flag) {
+  const Int<D> flags = FieldInt(d, placement, offsetof(Placement, flags));
   return hn::RebindMask(d, hn::TestBit(flags, hn::Set(IntTag<D>(), flag)));
 }
 
@@ -96,14 +100,14 @@ HWY_INLINE Vec3<D> MaxAbs3(const Triangle<D>& t) {
 /// more ulps of the largest vertex coordinate, not of the hit's (vertices may be far from it). Instanced ones
 /// add the transforms of vertices, origin and direction, relative to |M||p| + |t|.
 template <class D>
-HWY_INLINE Vec3<D> PositionError(D d, const GeometryView& g, Int<D> placement, Mask<D> instanced,
+HWY_INLINE Vec3<D> PositionError(D d, const Records<Placement, D>& placement, Mask<D> instanced,
                                  const Triangle<D>& t) {
   constexpr double kUlp = 0x1p-24;
   Vec3<D> error = Scale(MaxAbs3(t), Splat(d, 10 * kUlp));
   if (!hn::AllFalse(d, instanced)) {
     const auto row = [&](size_t i) HWY_ATTR {
       const size_t at = offsetof(Placement, object_to_world) + 16 * i + 12;
-      return hn::Abs(FieldReal(d, g.placements, placement, at));
+      return hn::Abs(FieldReal(d, placement, at));
     };
     const Vec3<D> translation = {row(0), row(1), row(2)};
     const Real<D> largest = hn::Max(MaxComponent(translation), MaxComponent(MaxAbs3(t)));
@@ -116,13 +120,14 @@ HWY_INLINE Vec3<D> PositionError(D d, const GeometryView& g, Int<D> placement, M
 
 template <class D>
 HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoint<D>& at,
-                                  Int<D> primitive, const Vec3<D>& ray_direction) {
-  const Triangle<D> t = TriangleVertices(d, c.geometry, at.placement, primitive);
-  const Mask<D> instanced = PlacementHas(d, c.geometry, at.placement, kPlacementInstanced);
+                                  const Vec3<D>& ray_direction) {
+  const Triangle<D> t = TriangleVertices(d, c.geometry, at.placement, at.index);
+  const Mask<D> instanced = PlacementHas(d, at.placement, kPlacementInstanced);
 
   Surface<D> s;
+  s.triangle = t;
   s.position = MulAdd(t.p1, at.b1, MulAdd(t.p2, at.b2, Scale(t.p0, at.b0)));
-  s.error = PositionError(d, c.geometry, at.placement, instanced, t);
+  s.error = PositionError(d, at.placement, instanced, t);
 
   const Vec3<D> toward = Neg<D>(ray_direction);
   const Vec3<D> area_normal = TriangleAreaNormal(t);
@@ -131,7 +136,7 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
   s.back = hn::Lt(Dot(front, toward), hn::Zero(d));
   s.geometric = Select<D>(s.back, Neg<D>(front), front);
 
-  const Int<D> normals = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, normals));
+  const Int<D> normals = FieldInt(d, at.placement, offsetof(Placement, normals));
   const Mask<D> smooth = IsPresent(d, normals);
   s.shading = s.geometric;
   if (!hn::AllFalse(d, smooth)) {
@@ -140,7 +145,7 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
                  Interpolate(d, c.geometry.floats, at, base, 3, 1),
                  Interpolate(d, c.geometry.floats, at, base, 3, 2)};
     if (!hn::AllFalse(d, instanced)) {
-      n = Select<D>(instanced, NormalToWorld(d, c.geometry, at.placement, n), n);
+      n = Select<D>(instanced, NormalToWorld(d, at.placement, n), n);
     }
     n = SafeNormalize(d, n, front);
     n = Select<D>(s.back, Neg<D>(n), n);
@@ -154,8 +159,8 @@ template <class D>
 HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const SurfacePoint<D>& at, Int<D> set) {
   const IntTag<D> di;
   const Int<D> zero = hn::Zero(di);
-  const Int<D> uvs = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uvs));
-  const Int<D> sets = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uv_sets));
+  const Int<D> uvs = FieldInt(d, at.placement, offsetof(Placement, uvs));
+  const Int<D> sets = FieldInt(d, at.placement, offsetof(Placement, uv_sets));
   const Mask<D> present = hn::And(IsPresent(d, uvs), hn::RebindMask(d, hn::Lt(set, sets)));
   if (hn::AllFalse(d, present)) return {hn::Zero(d), hn::Zero(d)};
   const auto vertex = [&](Int<D> i, int component) HWY_ATTR {
@@ -176,8 +181,8 @@ HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const Surface
 template <class D>
 HWY_INLINE Real<D> TwiceTextureArea(D d, const KernelContext& c, const SurfacePoint<D>& at) {
   const IntTag<D> di;
-  const Int<D> uvs = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uvs));
-  const Int<D> sets = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, uv_sets));
+  const Int<D> uvs = FieldInt(d, at.placement, offsetof(Placement, uvs));
+  const Int<D> sets = FieldInt(d, at.placement, offsetof(Placement, uv_sets));
   const Mask<D> present = IsPresent(d, uvs);
   const auto vertex = [&](Int<D> i, int component) HWY_ATTR {
     const Int<D> word = uvs + i * sets * hn::Set(di, 2) + hn::Set(di, component);
@@ -213,7 +218,7 @@ HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const SurfacePoi
   const IntTag<D> di;
   const Real<D> fill = Splat(d, absent);
   const Rgba<D> none = {{fill, fill, fill}, fill};
-  const Int<D> slot = FieldInt(d, c.materials, at.material,
+  const Int<D> slot = FieldInt(d, at.material,
                                offsetof(Material, slots) + 4 * static_cast<size_t>(which));
   active = hn::And(active, IsPresent(d, slot));
   if (hn::AllFalse(d, active)) return none;
@@ -236,12 +241,12 @@ HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const SurfacePoi
 template <class D>
 HWY_INLINE Rgba<D> BaseColor(D d, const KernelContext& c, const SurfacePoint<D>& at,
                              const TextureFootprint<D>& footprint, Mask<D> active) {
-  const Vec3<D> factor = FieldVec3(d, c.materials, at.material, offsetof(Material, base_color));
-  const Real<D> alpha = FieldReal(d, c.materials, at.material, offsetof(Material, base_color) + 12);
+  const Vec3<D> factor = FieldVec3(d, at.material, offsetof(Material, base_color));
+  const Real<D> alpha = FieldReal(d, at.material, offsetof(Material, base_color) + 12);
   const Rgba<D> texel = MaterialTexture(d, c, at, footprint, Slot::base_color, active, 1);
   Rgba<D> color = {Mul<D>(factor, texel.rgb), alpha * texel.a};
 
-  const Int<D> colors = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, colors));
+  const Int<D> colors = FieldInt(d, at.placement, offsetof(Placement, colors));
   const Mask<D> colored = hn::And(active, IsPresent(d, colors));
   if (!hn::AllFalse(d, colored)) {
     const Int<D> base = hn::Max(colors, hn::Zero(IntTag<D>()));
@@ -257,14 +262,14 @@ HWY_INLINE Rgba<D> BaseColor(D d, const KernelContext& c, const SurfacePoint<D>&
 
 /// How much of the surface is there, by alphaMode: 1, a step at the cutoff, or alpha itself.
 template <class D>
-HWY_INLINE Real<D> Opacity(D d, const KernelContext& c, const SurfacePoint<D>& at, Real<D> alpha) {
+HWY_INLINE Real<D> Opacity(D d, const SurfacePoint<D>& at, Real<D> alpha) {
   const IntTag<D> di;
-  const Int<D> mode = FieldInt(d, c.materials, at.material, offsetof(Material, alpha_mode));
+  const Int<D> mode = FieldInt(d, at.material, offsetof(Material, alpha_mode));
   const auto is = [&](AlphaMode m) HWY_ATTR {
     return hn::RebindMask(d, hn::Eq(mode, hn::Set(di, static_cast<int32_t>(m))));
   };
   const Real<D> one = Splat(d, 1);
-  const Real<D> cutoff = FieldReal(d, c.materials, at.material, offsetof(Material, alpha_cutoff));
+  const Real<D> cutoff = FieldReal(d, at.material, offsetof(Material, alpha_cutoff));
   const Real<D> step = hn::IfThenElseZero(hn::Ge(alpha, cutoff), one);
   const Real<D> clamped = hn::Min(hn::Max(alpha, hn::Zero(d)), one);
   return hn::IfThenElse(is(AlphaMode::mask), step, hn::IfThenElse(is(AlphaMode::blend), clamped, one));
@@ -277,12 +282,12 @@ HWY_INLINE Vec3<D> EmittedRadiance(D d, const KernelContext& c, const SurfacePoi
                                    const Vec2<D>& uv, Mask<D> active) {
   const TextureFootprint<D> finest = {uv, Splat(d, -100), hn::Zero(d)};
   const Rgba<D> texel = MaterialTexture(d, c, at, finest, Slot::emissive, active, 1);
-  return Mul<D>(FieldVec3(d, c.materials, at.material, offsetof(Material, emissive)), texel.rgb);
+  return Mul<D>(FieldVec3(d, at.material, offsetof(Material, emissive)), texel.rgb);
 }
 
 template <class D>
-HWY_INLINE Mask<D> MaterialHas(D d, const KernelContext& c, Int<D> material, int32_t flag) {
-  const Int<D> flags = FieldInt(d, c.materials, material, offsetof(Material, flags));
+HWY_INLINE Mask<D> MaterialHas(D d, const Records<Material, D>& material, int32_t flag) {
+  const Int<D> flags = FieldInt(d, material, offsetof(Material, flags));
   return hn::RebindMask(d, hn::TestBit(flags, hn::Set(IntTag<D>(), flag)));
 }
 
@@ -291,14 +296,14 @@ template <class D>
 HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<D>& at,
                                 const Surface<D>& s, const TextureFootprint<D>& footprint, Mask<D> active) {
   const IntTag<D> di;
-  const Int<D> tangents = FieldInt(d, c.geometry.placements, at.placement, offsetof(Placement, tangents));
-  const Int<D> slot = FieldInt(d, c.materials, at.material,
+  const Int<D> tangents = FieldInt(d, at.placement, offsetof(Placement, tangents));
+  const Int<D> slot = FieldInt(d, at.material,
                                offsetof(Material, slots) + 4 * static_cast<size_t>(Slot::normal));
   active = hn::And(active, hn::And(IsPresent(d, tangents), IsPresent(d, slot)));
   if (hn::AllFalse(d, active)) return s.shading;
 
   const Rgba<D> texel = MaterialTexture(d, c, at, footprint, Slot::normal, active, 0.5);
-  const Real<D> scale = FieldReal(d, c.materials, at.material, offsetof(Material, normal_scale));
+  const Real<D> scale = FieldReal(d, at.material, offsetof(Material, normal_scale));
   const auto expand = [&](Real<D> v) HWY_ATTR { return hn::MulSub(v, Splat(d, 2), Splat(d, 1)); };
   const Real<D> x = expand(texel.rgb.x) * scale, y = expand(texel.rgb.y) * scale;
   const Real<D> z = expand(texel.rgb.z);
@@ -308,10 +313,10 @@ HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<
                      Interpolate(d, c.geometry.floats, at, base, 4, 1),
                      Interpolate(d, c.geometry.floats, at, base, 4, 2)};
   Real<D> handedness = GatherReal(d, c.geometry.floats, base + at.index.i0 * hn::Set(di, 4) + hn::Set(di, 3));
-  const Mask<D> instanced = PlacementHas(d, c.geometry, at.placement, kPlacementInstanced);
+  const Mask<D> instanced = PlacementHas(d, at.placement, kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
-    tangent = Select<D>(instanced, VectorToWorld(d, c.geometry, at.placement, tangent), tangent);
-    const Mask<D> mirrored = PlacementHas(d, c.geometry, at.placement, kPlacementMirrored);
+    tangent = Select<D>(instanced, VectorToWorld(d, at.placement, tangent), tangent);
+    const Mask<D> mirrored = PlacementHas(d, at.placement, kPlacementMirrored);
     handedness = hn::IfThenElse(mirrored, hn::Neg(handedness), handedness);
   }
   // The map is given for the front; its frame stays that of the front when seen from behind, then flips.

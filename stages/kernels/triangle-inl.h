@@ -32,10 +32,11 @@ struct TriangleIndices {
 };
 
 template <class D>
-HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& view, Int<D> placement,
+HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& view,
+                                                    const Records<Placement, D>& placement,
                                                     Int<D> primitive) {
   const IntTag<D> di;
-  const Int<D> first = FieldInt(d, view.placements, placement, offsetof(Placement, first_index)) +
+  const Int<D> first = FieldInt(d, placement, offsetof(Placement, first_index)) +
                        primitive * hn::Set(di, 3);
   return {GatherInt(d, view.indices, first), GatherInt(d, view.indices, first + hn::Set(di, 1)),
           GatherInt(d, view.indices, first + hn::Set(di, 2))};
@@ -61,29 +62,36 @@ HWY_INLINE Vec3<D> TransformPoint(const Affine<D>& m, const Vec3<D>& p) {
 
 /// The triangle's vertices in world space. Every lane needs a valid placement and primitive.
 template <class D>
-HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view, Int<D> placement,
-                                        Int<D> primitive) {
+HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view,
+                                        const Records<Placement, D>& placement,
+                                        const TriangleIndices<D>& index) {
   const IntTag<D> di;
-  const TriangleIndices<D> index = GatherTriangleIndices(d, view, placement, primitive);
-  const Int<D> base = FieldInt(d, view.placements, placement, offsetof(Placement, positions));
+  const Int<D> base = FieldInt(d, placement, offsetof(Placement, positions));
   const auto vertex = [&](Int<D> i) HWY_ATTR {
     return GatherVec3(d, view.floats, base + i * hn::Set(di, 3));
   };
   Vec3<D> p0 = vertex(index.i0), p1 = vertex(index.i1), p2 = vertex(index.i2);
 
-  const Int<D> flags = FieldInt(d, view.placements, placement, offsetof(Placement, flags));
+  const Int<D> flags = FieldInt(d, placement, offsetof(Placement, flags));
   const auto has = [&](int32_t flag) HWY_ATTR {
     return hn::RebindMask(d, hn::TestBit(flags, hn::Set(di, flag)));
   };
   const Mask<D> instanced = has(kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
     // Flat lanes keep their vertices: going through an identity would cost them a rounding of -0.
-    const Affine<D> to_world = ObjectToWorld(d, view, placement);
+    const Affine<D> to_world = ObjectToWorld(d, view, placement.index);
     p0 = Select<D>(instanced, TransformPoint<D>(to_world, p0), p0);
     p1 = Select<D>(instanced, TransformPoint<D>(to_world, p1), p1);
     p2 = Select<D>(instanced, TransformPoint<D>(to_world, p2), p2);
   }
   return {p0, p1, p2, has(kPlacementMirrored)};
+}
+
+template <class D>
+HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view, Int<D> placement,
+                                        Int<D> primitive) {
+  const Records<Placement, D> record = MakeRecords(d, view.placements, placement);
+  return TriangleVertices(d, view, record, GatherTriangleIndices(d, view, record, primitive));
 }
 
 /// Twice the triangle's area times its geometric normal, on the side that glTF calls the front.

@@ -124,9 +124,10 @@ HWY_INLINE Real<D> SafeDiv(D d, Real<D> a, Real<D> b) {
 template <class D>
 HWY_INLINE Vec3<D> SafeNormalize(D d, const Vec3<D>& a, const Vec3<D>& fallback) {
   const Real<D> largest = hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
-  const Mask<D> ok = hn::And(hn::Gt(largest, Splat(d, 1e-37)), hn::Lt(largest, Splat(d, 1e37)));
+  Mask<D> ok = hn::And(hn::Gt(largest, Splat(d, 1e-37)), hn::Lt(largest, Splat(d, 1e37)));
   const Real<D> scale = Splat(d, 1) / hn::IfThenElse(ok, largest, Splat(d, 1));
   const Vec3<D> b = Scale(a, scale);
+  ok = hn::And(ok, hn::Gt(Dot(b, b), hn::Zero(d)));  // false for a NaN that Max let through
   const Real<D> inverse = Splat(d, 1) / hn::Sqrt(hn::IfThenElse(ok, Dot(b, b), Splat(d, 1)));
   return Select<D>(ok, Scale(b, inverse), fallback);
 }
@@ -209,6 +210,45 @@ template <class Record, class D>
 HWY_INLINE Vec3<D> FieldVec3(D d, const Record* HWY_RESTRICT base, Int<D> index, size_t offset) {
   return {FieldReal(d, base, index, offset), FieldReal(d, base, index, offset + 4),
           FieldReal(d, base, index, offset + 8)};
+}
+
+/// One record of a table per lane. Queues are binned by what paths read, so that mostly all lanes read the
+/// same record: then its fields are broadcast, which costs a load where a gather costs one per lane.
+template <class Record, class D>
+struct Records {
+  const Record* base;
+  Int<D> index;        // valid in every lane
+  const Record* same;  // the record of all lanes, or null if they differ
+};
+template <class Record, class D>
+HWY_INLINE Records<Record, D> MakeRecords(D d, const Record* base, Int<D> index) {
+  const Record* const first = base + hn::GetLane(index);
+  if constexpr (hn::MaxLanes(D()) == 1) {
+    return {base, index, first};
+  } else {
+    const IntTag<D> di;
+    const bool same = hn::AllTrue(di, hn::Eq(index, hn::Set(di, hn::GetLane(index))));
+    (void)d;
+    return {base, index, same ? first : nullptr};
+  }
+}
+template <class Record, class D>
+HWY_INLINE Real<D> FieldReal(D d, const Records<Record, D>& records, size_t offset) {
+  if (hn::MaxLanes(D()) == 1 || records.same != nullptr) {
+    return hn::Set(d, *reinterpret_cast<const float*>(reinterpret_cast<const char*>(records.same) + offset));
+  }
+  return FieldReal(d, records.base, records.index, offset);
+}
+template <class Record, class D>
+HWY_INLINE Int<D> FieldInt(D d, const Records<Record, D>& records, size_t offset) {
+  if (hn::MaxLanes(D()) == 1 || records.same != nullptr) {
+    return hn::Set(IntTag<D>(), *reinterpret_cast<const int32_t*>(reinterpret_cast<const char*>(records.same) + offset));
+  }
+  return FieldInt(d, records.base, records.index, offset);
+}
+template <class Record, class D>
+HWY_INLINE Vec3<D> FieldVec3(D d, const Records<Record, D>& records, size_t offset) {
+  return {FieldReal(d, records, offset), FieldReal(d, records, offset + 4), FieldReal(d, records, offset + 8)};
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

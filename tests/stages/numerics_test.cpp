@@ -126,6 +126,7 @@ TEST(Numerics, SafeNormalizeHoldsOverTheWholeRange) {
     in[2].push_back(static_cast<float>(z));
   };
   add(0, 0, 0), add(-0.0, 0, 0), add(0, 1, kNan), add(kInfinity, 0, 0), add(0, -kInfinity, 1);
+  add(kNan, 1, 0), add(1, kNan, 0);
   const size_t bad = in[0].size();
   add(9e36, 9e36, 9e36), add(2e-37, 0, 0), add(1, 1e-30, 0), add(0, 0, -5);
   while (in[0].size() < 4096) {
