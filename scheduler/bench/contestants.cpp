@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -28,10 +29,17 @@ Result add_up(tbb::combinable<Result>& parts) {
   });
 }
 
+// One arena per number of threads, for all contestants and runs: threads take a while to find a new
+// one.
+tbb::task_arena& arena_of(const Setup& setup) {
+  static std::map<int, tbb::task_arena> arenas;
+  return arenas.try_emplace(setup.threads, setup.threads).first->second;
+}
+
 }  // namespace
 
 Result inlined_loop(const Work& work, const Setup& setup) {
-  tbb::task_arena arena(setup.threads);
+  tbb::task_arena& arena = arena_of(setup);
   tbb::combinable<Result> parts;
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, work.items, 512),
@@ -86,8 +94,7 @@ Result carpool_run(const Work& work, const Setup& setup) {
         }
         return last < work.items ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
       });
-  carpool::run(
-      graph, {.threads = static_cast<std::uint32_t>(setup.threads), .in_flight = setup.in_flight});
+  carpool::run(graph, {.arena = &arena_of(setup), .in_flight = setup.in_flight});
   Result sum;
   for (const Result& part : parts) {
     sum.sum += part.sum;
@@ -99,7 +106,7 @@ Result carpool_run(const Work& work, const Setup& setup) {
 // A parallel_for per hop over 4k items, no keys: the strongest simple rival.
 Result waves(const Work& work, const Setup& setup) {
   constexpr std::uint64_t kWave = 4096;
-  tbb::task_arena arena(setup.threads);
+  tbb::task_arena& arena = arena_of(setup);
   tbb::combinable<Result> parts;
   arena.execute([&] {
     std::vector<Item> items;
@@ -132,7 +139,7 @@ Result waves(const Work& work, const Setup& setup) {
 
 Result flow_graph(const Work& work, const Setup& setup) {
   using Node = tbb::flow::function_node<Item, tbb::flow::continue_msg>;
-  tbb::task_arena arena(setup.threads);
+  tbb::task_arena& arena = arena_of(setup);
   tbb::combinable<Result> parts;
   arena.execute([&] {
     tbb::flow::graph graph;
@@ -161,7 +168,7 @@ Result flow_graph(const Work& work, const Setup& setup) {
 }
 
 Result feeder(const Work& work, const Setup& setup) {
-  tbb::task_arena arena(setup.threads);
+  tbb::task_arena& arena = arena_of(setup);
   tbb::combinable<Result> parts;
   arena.execute([&] {
     std::vector<Item> items;
@@ -188,7 +195,7 @@ Result feeder(const Work& work, const Setup& setup) {
 }
 
 Result task_group(const Work& work, const Setup& setup) {
-  tbb::task_arena arena(setup.threads);
+  tbb::task_arena& arena = arena_of(setup);
   tbb::combinable<Result> parts;
   arena.execute([&] {
     tbb::task_group group;

@@ -38,13 +38,13 @@ ReadyBlock* ReadyQueue::unlink(std::uint32_t lane, bool newest) {
   return ready;
 }
 
-ReadyBlock* ReadyQueue::take(bool newest) {
+ReadyBlock* ReadyQueue::take(bool newest, std::uint32_t end) {
   if (size() == 0) {
     return nullptr;  // only the owner, who is asking, could have added one
   }
   const std::lock_guard guard(lock_);
   const std::uint32_t lane = used_.first();
-  return lane == Bitmap::kNone ? nullptr : unlink(lane, newest);
+  return lane >= end ? nullptr : unlink(lane, newest);  // Bitmap::kNone is above all
 }
 
 ReadyBlock* ReadyQueue::steal(std::uint32_t items) {

@@ -25,8 +25,9 @@ class ReadyQueue {
 
   void push(ReadyBlock* ready);
 
-  // take returns the best block, the newest or oldest of its lane, or null.
-  ReadyBlock* take(bool newest);
+  // take returns the best block of the lanes below `end`, the newest or oldest of its lane, or
+  // null.
+  ReadyBlock* take(bool newest, std::uint32_t end);
 
   // steal takes the best block, the oldest of its lane, and more of them while they are tiny: up to
   // `items` items or half of the queue. Returns a list linked by `newer`, or null if there is

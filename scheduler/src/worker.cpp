@@ -92,15 +92,26 @@ void Worker::end_shift() {
 }
 
 // The order of the whole scheduler is here: what is ready; then new items while credits are plenty,
-// which keeps this worker on its own data; then what others have ready; then partial blocks; and
-// new items once more, one by one if need be.
+// which keeps this worker on its own data; then what others have ready; then partial blocks, last
+// of all those that have been offered to others, who need time to come; and new items once more,
+// one by one if need be.
 bool Worker::acquire(Work& work) {
-  return take_ready(work) || take_source(work, false) || steal(work) || take_open(work) ||
-         take_source(work, true);
+  return take_ready(work, offers_stand() ? layout_.lanes : layout_.ready_lanes()) ||
+         take_source(work, false) || steal(work) || take_open(work) ||
+         take_ready(work, layout_.ready_lanes()) || take_source(work, true);
 }
 
-bool Worker::take_ready(Work& work) {
-  ReadyBlock* ready = ready_.take(newest_first_);
+// An offer stands for a while, and longer if somebody is on the way. Not for ever: an arena may be
+// too busy to send anybody.
+bool Worker::offers_stand() const {
+  if (ready_.partials() == 0 || now_ < share_after_) {
+    return true;  // in the first case there is nothing to take back anyway
+  }
+  return gate_.relaxed_view().invited() != 0 && now_ < share_after_ + kLongestSharePause;
+}
+
+bool Worker::take_ready(Work& work, std::uint32_t end_lane) {
+  ReadyBlock* ready = ready_.take(newest_first_, end_lane);
   if (ready == nullptr) {
     return false;
   }
@@ -388,7 +399,7 @@ void Worker::found_work() {
 
 std::uint64_t Worker::drop_all() {
   std::uint64_t items = open_.drop_all();
-  while (const ReadyBlock* ready = ready_.take(true)) {
+  while (const ReadyBlock* ready = ready_.take(true, layout_.ready_lanes())) {
     items += ready->block.items;
   }
   return items;

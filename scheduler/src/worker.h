@@ -52,7 +52,8 @@ class Worker final : private BlockSink {
 
  private:
   bool acquire(Work& work);
-  bool take_ready(Work& work);
+  bool offers_stand() const;
+  bool take_ready(Work& work, std::uint32_t end_lane);
   bool take_source(Work& work, bool last_resort);
   bool steal(Work& work);
   bool take_open(Work& work);

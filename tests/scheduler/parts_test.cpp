@@ -72,13 +72,14 @@ TEST(ReadyQueueTest, LanesThenAge) {
   }
   EXPECT_EQ(size.load(), 4U);
   EXPECT_EQ(queue.partials(), 1U);
-  EXPECT_EQ(queue.take(true), &second);  // the newest of its lane
+  EXPECT_EQ(queue.take(true, 8), &second);  // the newest of its lane
   queue.push(&second);
-  EXPECT_EQ(queue.take(false), &first);  // the oldest
-  EXPECT_EQ(queue.take(false), &second);
-  EXPECT_EQ(queue.take(false), &late_lane);
-  EXPECT_EQ(queue.take(false), &partial);
-  EXPECT_EQ(queue.take(false), nullptr);
+  EXPECT_EQ(queue.take(false, 8), &first);  // the oldest
+  EXPECT_EQ(queue.take(false, 8), &second);
+  EXPECT_EQ(queue.take(false, 8), &late_lane);
+  EXPECT_EQ(queue.take(false, 4), nullptr);  // not that far
+  EXPECT_EQ(queue.take(false, 8), &partial);
+  EXPECT_EQ(queue.take(false, 8), nullptr);
   EXPECT_EQ(queue.partials(), 0U);
 }
 
