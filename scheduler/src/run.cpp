@@ -225,6 +225,10 @@ RunReport run(const Graph& graph, const RunOptions& options) {
   return ThreadedRun(graph, options, choice).run();
 }
 
+std::uint32_t worker_count(const RunOptions& options) {
+  return workers_of(options);
+}
+
 std::size_t worst_case_bytes(const Graph& graph, const RunOptions& options) {
   graph.validate();
   const Layout layout(graph, options, workers_of(options));

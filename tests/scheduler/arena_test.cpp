@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <memory>
 #include <thread>
 #include <vector>
 
@@ -75,25 +74,25 @@ TEST(ArenaTest, RunsInsideKernels) {
   EXPECT_EQ(good.load(), 60);
 }
 
+// Static, because the task may outlive the test; and not captured, because the thread sanitizer
+// cannot see how oneTBB hands captures over.
+std::atomic<bool> occupied{false};
+std::atomic<bool> end_occupation{false};
+
 // An arena whose other threads never come: the caller alone must get everything done.
 TEST(ArenaTest, ProgressNeedsNoSecondThread) {
-  struct Occupation {
-    std::atomic<bool> begun{false};
-    std::atomic<bool> end{false};
-  };
-  const auto occupation = std::make_shared<Occupation>();  // the task may outlive the test
   tbb::task_arena arena(2);
-  arena.enqueue([occupation] {
-    occupation->begun = true;
-    occupation->begun.notify_one();
-    occupation->end.wait(false);
+  arena.enqueue([] {
+    occupied = true;
+    occupied.notify_one();
+    end_occupation.wait(false);
   });
-  occupation->begun.wait(false);
+  occupied.wait(false);
   RandomGraph random({.seed = 11, .items = 5000});
   carpool::run(random.graph(), {.arena = &arena, .in_flight = 500});
   EXPECT_EQ(random.counted(), random.expected());
-  occupation->end = true;
-  occupation->end.notify_one();
+  end_occupation = true;
+  end_occupation.notify_one();
 }
 
 TEST(ArenaTest, ManyShortRuns) {
@@ -109,6 +108,8 @@ TEST(ArenaTest, WorkerIndicesAreDense) {
   RandomGraph random({.seed = 12, .items = 5000});
   const auto report = carpool::run(random.graph(), {.threads = 3});
   EXPECT_EQ(report.workers.size(), 3U);
+  EXPECT_EQ(carpool::worker_count({.threads = 3}), 3U);
+  EXPECT_EQ(carpool::worker_count({.threads = 3, .mode = carpool::RunMode::serial}), 1U);
 }
 
 // One long kernel call publishes blocks while it runs; another worker must be called to take them.

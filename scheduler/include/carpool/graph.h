@@ -33,7 +33,7 @@ struct StageOptions {
 
 /// SourceStatus is what a source says about its future.
 enum class SourceStatus {
-  more,       ///< Call again when there are credits.
+  more,       ///< Call again when there are credits: at once, if this call emitted nothing.
   exhausted,  ///< Never call again in this run.
 };
 

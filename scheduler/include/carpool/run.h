@@ -104,6 +104,10 @@ struct RunOptions {
 /// throw.
 RunReport run(const Graph& graph, const RunOptions& options = {});
 
+/// worker_count returns how many workers such a run would have, which is the size for per-worker
+/// scratch memory: Batch::worker is below it.
+std::uint32_t worker_count(const RunOptions& options = {});
+
 /// worst_case_bytes returns how much memory the blocks and tables of such a run can need. A run
 /// stays below it whatever its kernels do, within the fan-out they declared. README.md derives the
 /// formula.
