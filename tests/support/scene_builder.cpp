@@ -1,6 +1,7 @@
 // glTF text with base64 buffers.
 #include "tests/support/scene_builder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
