@@ -1,0 +1,94 @@
+// The executors' parts: which packets a pass hands out, how slots go round, how bins are coarsened.
+#include <gtest/gtest.h>
+#include <tbb/parallel_for.h>
+
+#include <map>
+#include <mutex>
+#include <set>
+
+#include "stages/executors/binning.h"
+#include "stages/executors/camera_work.h"
+#include "stages/executors/slot_pool.h"
+
+namespace carpool::stages {
+namespace {
+
+using Key = std::tuple<uint32_t, uint32_t, uint32_t>;
+
+std::map<Key, int> Visits(uint32_t width, uint32_t height, const CameraPass& pass, uint32_t chunk) {
+  CameraWork work(width, height, pass);
+  std::map<Key, int> visits;
+  while (work.Claim(chunk, [&](const CameraPacket& p) { ++visits[{p.x, p.y, p.sample}]; })) {
+  }
+  EXPECT_EQ(work.Fraction(), 1);
+  return visits;
+}
+
+TEST(CameraWork, CoversEveryGroupOfEverySampleOnce) {
+  for (const uint32_t chunk : {1u, 7u, 32u, 1000u}) {
+    const auto visits = Visits(37, 21, {.first_sample = 5, .sample_count = 3}, chunk);
+    EXPECT_EQ(visits.size(), 10u * 11 * 3);  // groups of 4x2 that touch 37x21
+    for (const auto& [key, count] : visits) {
+      EXPECT_EQ(count, 1);
+      EXPECT_EQ(std::get<0>(key) % kGroupWidth, 0u);
+      EXPECT_GE(std::get<2>(key), 5u);
+      EXPECT_LT(std::get<2>(key), 8u);
+    }
+  }
+}
+
+TEST(CameraWork, PhasesPartitionThePass) {
+  std::map<Key, int> all;
+  for (uint32_t phase = 0; phase < kPhases; ++phase) {
+    const auto visits = Visits(64, 64, {.first_sample = 0, .sample_count = 1, .phases = 1u << phase}, 16);
+    EXPECT_EQ(visits.size(), 16u * 32 / kPhases);
+    for (const auto& [key, count] : visits) all[key] += count;
+  }
+  EXPECT_EQ(all.size(), 16u * 32);
+  for (const auto& [key, count] : all) EXPECT_EQ(count, 1);
+}
+
+TEST(SlotPool, NeverHandsOutASlotTwiceAndNeverRunsDry) {
+  constexpr uint32_t kInFlight = 3000, kWorkers = 4;
+  SlotPool pool(kInFlight, kWorkers);
+  std::vector<std::atomic<int>> taken(pool.capacity());
+  tbb::parallel_for(uint32_t{0}, kWorkers, [&](uint32_t worker) {
+    std::vector<uint32_t> mine;
+    for (int round = 0; round < 200; ++round) {
+      while (mine.size() < kInFlight / kWorkers) {
+        mine.push_back(pool.Take(worker));
+        ASSERT_LT(mine.back(), pool.capacity());
+        EXPECT_EQ(taken[mine.back()].fetch_add(1), 0);
+      }
+      const size_t keep = static_cast<size_t>(round * 37) % mine.size();
+      const std::vector<uint32_t> back(mine.begin() + static_cast<ptrdiff_t>(keep), mine.end());
+      for (const uint32_t slot : back) taken[slot].fetch_sub(1);
+      mine.resize(keep);
+      pool.Give(worker, back);
+    }
+  }, tbb::simple_partitioner());
+}
+
+TEST(ShadeBins, KeepsMaterialsApartWhileTheyCanBeFilled) {
+  const ShadeBins few(5, 8, 65536, 256);
+  std::set<uint32_t> bins;
+  for (int32_t m = 0; m < 5; ++m) {
+    for (uint32_t depth = 0; depth < 4; ++depth) bins.insert(few.Of(m, depth));
+  }
+  EXPECT_EQ(bins.size(), 20u);
+  EXPECT_EQ(few.count(), 20u);
+  EXPECT_TRUE(few.Note().empty());
+  EXPECT_EQ(few.Of(2, 3), few.Of(2, 200));  // all deep ones together
+}
+
+TEST(ShadeBins, CoarsensAndSaysSo) {
+  const ShadeBins many(10000, 8, 65536, 256);
+  EXPECT_LE(many.count(), 128u);
+  EXPECT_FALSE(many.Note().empty());
+  for (int32_t m = 0; m < 10000; ++m) EXPECT_LT(many.Of(m, 7), many.count());
+  const ShadeBins tiny(3, 8, 100, 4096);
+  EXPECT_EQ(tiny.count(), 1u);
+}
+
+}  // namespace
+}  // namespace carpool::stages
