@@ -68,12 +68,12 @@ struct Tile {
 };
 
 template <class Visit>
-void ForTiles(const FilmAccumulator& film, Visit visit) {
-  const uint32_t across = (film.width() + kPool - 1) / kPool;
-  const uint32_t down = (film.height() + kPool - 1) / kPool;
+void ForTiles(const FilmAccumulator& film, Visit visit, uint32_t side = kPool) {
+  const uint32_t across = (film.width() + side - 1) / side;
+  const uint32_t down = (film.height() + side - 1) / side;
   tbb::parallel_for(uint32_t{0}, across * down, [&](uint32_t i) {
-    const uint32_t x = i % across * kPool, y = i / across * kPool;
-    visit(i, Tile{x, y, std::min(x + kPool, film.width()), std::min(y + kPool, film.height())});
+    const uint32_t x = i % across * side, y = i / across * side;
+    visit(i, Tile{x, y, std::min(x + side, film.width()), std::min(y + side, film.height())});
   });
 }
 
@@ -103,25 +103,28 @@ RgbPlane ResolveBeauty(const FilmAccumulator& film) {
 }
 
 RgbPlane ResolvePreview(const FilmAccumulator& film) {
-  RgbPlane plane = ResolveBeauty(film);
+  constexpr uint32_t kSide = 16;  // of a tile in which every phase of a preview has pixels
+  RgbPlane plane(size_t{film.width()} * film.height() * 3);
   ForTiles(film, [&](uint32_t, const Tile& tile) {
+    struct Sampled {
+      int x, y;
+      Triple mean;
+    };
+    std::vector<Sampled> sampled;
     ForPixels(film, tile, [&](uint32_t pixel) {
-      if (film.Samples(pixel) != 0) return;
-      const int x = static_cast<int>(pixel % film.width()), y = static_cast<int>(pixel / film.width());
-      int best = 1 << 30;
-      uint32_t from = pixel;
-      ForPixels(film, tile, [&](uint32_t other) {
-        const int dx = static_cast<int>(other % film.width()) - x;
-        const int dy = static_cast<int>(other / film.width()) - y;
-        const int distance = dx * dx + dy * dy;
-        if (film.Samples(other) != 0 && distance < best) {
-          best = distance;
-          from = other;
-        }
-      });
-      Store(plane, pixel, MeanOf(film, from));
+      if (film.Samples(pixel) == 0) return;
+      sampled.push_back({static_cast<int>(pixel % film.width()), static_cast<int>(pixel / film.width()), MeanOf(film, pixel)});
     });
-  });
+    if (sampled.empty()) return;
+    ForPixels(film, tile, [&](uint32_t pixel) {
+      const int x = static_cast<int>(pixel % film.width()), y = static_cast<int>(pixel / film.width());
+      const auto distance = [&](const Sampled& s) { return (s.x - x) * (s.x - x) + (s.y - y) * (s.y - y); };
+      const auto nearest = std::min_element(sampled.begin(), sampled.end(), [&](const Sampled& a, const Sampled& b) {
+        return distance(a) < distance(b);
+      });
+      Store(plane, pixel, nearest->mean);
+    });
+  }, kSide);
   return plane;
 }
 

@@ -14,8 +14,8 @@ using RgbPlane = std::vector<float>;
 /// Mean over all samples of each pixel; pixels without a sample are 0.
 RgbPlane ResolveBeauty(const stages::FilmAccumulator& film);
 
-/// Like ResolveBeauty, but a pixel without a sample takes the nearest one that has some in its row-major 8x8
-/// neighbourhood: a picture of an interleaved subset.
+/// Like ResolveBeauty, but a pixel without a sample takes the nearest one of its 16x16 tile that has some: a
+/// picture of an interleaved subset.
 RgbPlane ResolvePreview(const stages::FilmAccumulator& film);
 
 /// Standard error of each pixel's mean. It comes from the four scrambles' means, whose variance is pooled

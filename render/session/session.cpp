@@ -68,13 +68,16 @@ class PassLoop {
     return std::clamp<uint32_t>(rounded > done_ ? rounded - done_ : 1, 1, left);
   }
 
-  /// The first sample of every eighth group of pixels, then of the others.
+  /// The first sample of an even subset of the groups of pixels, then of more, then of all.
   void FirstPreview() {
     const Clock::time_point start = Clock::now();
-    Pass({.first_sample = 0, .sample_count = 1, .phases = 1}, false);
+    Pass({.first_sample = 0, .sample_count = 1, .phases = 0x1}, false);
     SavePreview(true);
     summary_.first_preview_seconds = SecondsSince(start);
-    if (!stopped_) Pass({.first_sample = 0, .sample_count = 1, .phases = ((1u << stages::kPhases) - 1) & ~1u});
+    if (stopped_) return;
+    Pass({.first_sample = 0, .sample_count = 1, .phases = 0xfe}, false);
+    SavePreview(true);
+    if (!stopped_) Pass({.first_sample = 0, .sample_count = 1, .phases = stages::kAllPhases & ~0xffu});
   }
 
   void SavePreview(bool partial) {

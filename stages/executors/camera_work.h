@@ -10,13 +10,14 @@ namespace carpool::stages {
 constexpr uint32_t kGroupWidth = 4, kGroupHeight = 2;  // pixels of one coherent packet
 constexpr uint32_t kTileSize = 16;                     // pixels along a tile's side
 constexpr uint32_t kGroupsPerTile = kTileSize * kTileSize / 8;
-constexpr uint32_t kPhases = 8;  // interleaved subsets of groups, for previews
+constexpr uint32_t kPhases = 32;  // interleaved subsets of groups, for previews
+constexpr uint32_t kAllPhases = ~0u;
 
 /// Samples [first_sample, first_sample + sample_count) of the groups whose phase is in `phases` (bit p: phase p).
 struct CameraPass {
   uint32_t first_sample = 0;
   uint32_t sample_count = 1;
-  uint32_t phases = (1u << kPhases) - 1;
+  uint32_t phases = kAllPhases;
 };
 
 /// A fixed group of 4x2 pixels at one sample: what one packet traces. Groups on the border may reach outside the image.
@@ -25,11 +26,11 @@ struct CameraPacket {
   uint32_t sample;
 };
 
-/// The phase of the group whose first pixel is (x, y): a 2x4 pattern of groups, hence 8x8 pixels.
+/// The phase of the group whose first pixel is (x, y), by its place among the 4 x 8 groups of its tile. The coordinates' bits are
+/// interleaved in reverse, so that the first 2^k phases are always an even grid.
 inline uint32_t PhaseOf(uint32_t x, uint32_t y) {
-  // Bit-reversed row order, so that the first phases lie far apart.
-  constexpr uint32_t kOrder[8] = {0, 4, 6, 2, 3, 7, 5, 1};
-  return kOrder[(x / kGroupWidth % 2) * 4 + y / kGroupHeight % 4];
+  const uint32_t column = x / kGroupWidth, row = y / kGroupHeight;
+  return (row & 1) << 4 | (column & 1) << 3 | (row & 2) << 1 | (column & 2) | (row & 4) >> 2;
 }
 
 /// Hands out the packets of a pass, each once. Thread safe and lock free.
