@@ -10,14 +10,15 @@ namespace carpool::render {
 /// Exit codes of the programs; scripts rely on them.
 enum class ExitCode : int {
   done = 0,
-  no = 1,              // the question's answer is no
-  usage = 2,           // the command line is wrong
-  bad_input = 3,       // the input is bad
-  output_failed = 4,   // the output could not be written
-  interrupted = 130,   // stopped by a signal, what was rendered is saved
+  no = 1,             // the question's answer is no
+  usage = 2,          // the command line is wrong
+  bad_input = 3,      // the input is bad
+  output_failed = 4,  // the output could not be written
+  interrupted = 130,  // stopped by a signal, what was rendered is saved
 };
 
-/// Thrown for anything a user can mend. `what()` is one line: "FILE: /json/pointer: what is wrong; what to do".
+/// Thrown for anything a user can mend. `what()` is one line: "FILE: /json/pointer: what is wrong;
+/// what to do".
 class Error : public std::runtime_error {
  public:
   Error(ExitCode code, const std::string& line) : std::runtime_error(line), code_(code) {}

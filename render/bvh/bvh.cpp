@@ -1,11 +1,11 @@
-// Embree scenes over flat and instanced placements, opaque ones apart from those that may let rays through.
+// Embree scenes over flat and instanced placements, opaque ones apart from those that may let rays
+// through.
 #include "render/bvh/bvh.h"
 
 #include <atomic>
 #include <chrono>
 #include <map>
 #include <stdexcept>
-
 
 namespace carpool::render {
 namespace {
@@ -14,7 +14,9 @@ using stages::Placement;
 using stages::SceneTables;
 using stages::Shape;
 
-struct GeometryReleaser { void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); } };
+struct GeometryReleaser {
+  void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
 using GeometryPtr = std::unique_ptr<RTCGeometryTy, GeometryReleaser>;
 
 std::string DeviceConfig(const std::string& isa) {
@@ -48,7 +50,8 @@ GeometryPtr NewTriangles(RTCDevice device, const SceneTables& scene, const Place
                              g.floats.data(), sizeof(float) * static_cast<size_t>(p.positions),
                              3 * sizeof(float), static_cast<size_t>(shape.vertex_count));
   rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                             g.indices.data(), sizeof(uint32_t) * static_cast<size_t>(p.first_index),
+                             g.indices.data(),
+                             sizeof(uint32_t) * static_cast<size_t>(p.first_index),
                              3 * sizeof(uint32_t), static_cast<size_t>(shape.triangle_count));
   rtcCommitGeometry(geometry.get());
   return geometry;
@@ -63,7 +66,8 @@ bool IsTransparent(const SceneTables& scene, const Placement& placement) {
 }
 
 bool Bvh::CountMemory(void* self, ssize_t bytes, bool) {
-  std::atomic_ref<uint64_t>(static_cast<Bvh*>(self)->bytes_).fetch_add(static_cast<uint64_t>(bytes));
+  std::atomic_ref<uint64_t>(static_cast<Bvh*>(self)->bytes_)
+      .fetch_add(static_cast<uint64_t>(bytes));
   return true;
 }
 
@@ -84,18 +88,19 @@ Bvh::~Bvh() {
   device_.reset();
 }
 
-// Attaches the shapes of one mesh, from the placements that one of its instances has; `members` gets the place
-// among them of each Embree geometry.
-ScenePtr Bvh::BuildMesh(const SceneTables& scene, const PlacementPlan::Instanced& instance, bool transparent,
-                        bool robust, std::vector<int32_t>& members) {
+// Attaches the shapes of one mesh, from the placements that one of its instances has; `members`
+// gets the place among them of each Embree geometry.
+ScenePtr Bvh::BuildMesh(const SceneTables& scene, const PlacementPlan::Instanced& instance,
+                        bool transparent, bool robust, std::vector<int32_t>& members) {
   const stages::Mesh& mesh = scene.geometry.meshes[instance.mesh];
   ScenePtr built;
   for (int32_t s = 0; s < mesh.shape_count; ++s) {
     const Placement& p = scene.geometry.placements[instance.first_placement + s];
     if (IsTransparent(scene, p) != transparent) continue;
     if (!built) built = NewScene(device_.get(), robust);
-    rtcAttachGeometry(built.get(), NewTriangles(device_.get(), scene, p,
-                                                scene.geometry.shapes[mesh.first_shape + s]).get());
+    rtcAttachGeometry(
+        built.get(),
+        NewTriangles(device_.get(), scene, p, scene.geometry.shapes[mesh.first_shape + s]).get());
     members.push_back(s);
   }
   if (built) rtcCommitScene(built.get());
@@ -108,7 +113,8 @@ void Bvh::BuildLevel(Level& level, const SceneTables& scene, const PlacementPlan
   for (const PlacementPlan::Flat& flat : plan.flat) {
     const Placement& p = scene.geometry.placements[flat.placement];
     if (IsTransparent(scene, p) != transparent) continue;
-    const GeometryPtr geometry = NewTriangles(device_.get(), scene, p, scene.geometry.shapes[flat.shape]);
+    const GeometryPtr geometry =
+        NewTriangles(device_.get(), scene, p, scene.geometry.shapes[flat.shape]);
     rtcAttachGeometry(top.get(), geometry.get());  // numbers are given in order from 0
     level.top.push_back(flat.placement);
   }
@@ -134,14 +140,16 @@ void Bvh::BuildLevel(Level& level, const SceneTables& scene, const PlacementPlan
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(top.get(), geometry.get());
     level.top.push_back(static_cast<int32_t>(level.nested.size()));
-    for (const int32_t member : mesh.members) level.nested.push_back(instance.first_placement + member);
+    for (const int32_t member : mesh.members)
+      level.nested.push_back(instance.first_placement + member);
   }
 
   if (level.top.empty()) return;
   rtcCommitScene(top.get());
   const RTCError error = rtcGetDeviceError(device_.get());
   if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
-  if (error != RTC_ERROR_NONE) throw std::runtime_error("Embree failed to build the scene, error " + std::to_string(error));
+  if (error != RTC_ERROR_NONE)
+    throw std::runtime_error("Embree failed to build the scene, error " + std::to_string(error));
   level.scene = std::move(top);
 }
 

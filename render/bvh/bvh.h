@@ -17,13 +17,18 @@ struct BvhOptions {
   bool robust = true;        // Embree's ROBUST flag: watertight along shared edges
 };
 
-struct DeviceReleaser { void operator()(RTCDevice device) const { rtcReleaseDevice(device); } };
-struct SceneReleaser { void operator()(RTCScene scene) const { rtcReleaseScene(scene); } };
+struct DeviceReleaser {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct SceneReleaser {
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
 using DevicePtr = std::unique_ptr<RTCDeviceTy, DeviceReleaser>;
 using ScenePtr = std::unique_ptr<RTCSceneTy, SceneReleaser>;
 
-/// Bvh owns Embree's device and scenes. Borrows the vertex and index streams of the scene it was built over, which
-/// must outlive it unchanged. Building uses the threads of the calling arena; queries are thread safe.
+/// Bvh owns Embree's device and scenes. Borrows the vertex and index streams of the scene it was
+/// built over, which must outlive it unchanged. Building uses the threads of the calling arena;
+/// queries are thread safe.
 class Bvh {
  public:
   Bvh(stages::SceneTables& scene, const PlacementPlan& plan, const BvhOptions& options);
@@ -42,10 +47,10 @@ class Bvh {
     std::vector<int32_t> top, nested;
   };
 
-  void BuildLevel(Level& level, const stages::SceneTables& scene, const PlacementPlan& plan, bool transparent,
-                  bool robust);
-  ScenePtr BuildMesh(const stages::SceneTables& scene, const PlacementPlan::Instanced& instance, bool transparent,
-                     bool robust, std::vector<int32_t>& members);
+  void BuildLevel(Level& level, const stages::SceneTables& scene, const PlacementPlan& plan,
+                  bool transparent, bool robust);
+  ScenePtr BuildMesh(const stages::SceneTables& scene, const PlacementPlan::Instanced& instance,
+                     bool transparent, bool robust, std::vector<int32_t>& members);
   static bool CountMemory(void* self, ssize_t bytes, bool post);
 
   uint64_t bytes_ = 0;

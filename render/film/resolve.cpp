@@ -31,7 +31,9 @@ Triple MeanOf(const FilmAccumulator& film, uint32_t pixel) {
   return mean;
 }
 
-double LuminanceOf(const Triple& rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
+double LuminanceOf(const Triple& rgb) {
+  return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
 
 /// Variance of a pixel's mean, per channel and of its luminance, from the spread of the scrambles.
 struct PixelVariance {
@@ -105,26 +107,33 @@ RgbPlane ResolveBeauty(const FilmAccumulator& film) {
 RgbPlane ResolvePreview(const FilmAccumulator& film) {
   constexpr uint32_t kSide = 16;  // of a tile in which every phase of a preview has pixels
   RgbPlane plane(size_t{film.width()} * film.height() * 3);
-  ForTiles(film, [&](uint32_t, const Tile& tile) {
-    struct Sampled {
-      int x, y;
-      Triple mean;
-    };
-    std::vector<Sampled> sampled;
-    ForPixels(film, tile, [&](uint32_t pixel) {
-      if (film.Samples(pixel) == 0) return;
-      sampled.push_back({static_cast<int>(pixel % film.width()), static_cast<int>(pixel / film.width()), MeanOf(film, pixel)});
-    });
-    if (sampled.empty()) return;
-    ForPixels(film, tile, [&](uint32_t pixel) {
-      const int x = static_cast<int>(pixel % film.width()), y = static_cast<int>(pixel / film.width());
-      const auto distance = [&](const Sampled& s) { return (s.x - x) * (s.x - x) + (s.y - y) * (s.y - y); };
-      const auto nearest = std::min_element(sampled.begin(), sampled.end(), [&](const Sampled& a, const Sampled& b) {
-        return distance(a) < distance(b);
-      });
-      Store(plane, pixel, nearest->mean);
-    });
-  }, kSide);
+  ForTiles(
+      film,
+      [&](uint32_t, const Tile& tile) {
+        struct Sampled {
+          int x, y;
+          Triple mean;
+        };
+        std::vector<Sampled> sampled;
+        ForPixels(film, tile, [&](uint32_t pixel) {
+          if (film.Samples(pixel) == 0) return;
+          sampled.push_back({static_cast<int>(pixel % film.width()),
+                             static_cast<int>(pixel / film.width()), MeanOf(film, pixel)});
+        });
+        if (sampled.empty()) return;
+        ForPixels(film, tile, [&](uint32_t pixel) {
+          const int x = static_cast<int>(pixel % film.width()),
+                    y = static_cast<int>(pixel / film.width());
+          const auto distance = [&](const Sampled& s) {
+            return (s.x - x) * (s.x - x) + (s.y - y) * (s.y - y);
+          };
+          const auto nearest = std::min_element(
+              sampled.begin(), sampled.end(),
+              [&](const Sampled& a, const Sampled& b) { return distance(a) < distance(b); });
+          Store(plane, pixel, nearest->mean);
+        });
+      },
+      kSide);
   return plane;
 }
 

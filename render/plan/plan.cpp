@@ -35,7 +35,9 @@ size_t CountIf(const std::vector<Material>& materials, Predicate predicate) {
   return static_cast<size_t>(std::count_if(materials.begin(), materials.end(), predicate));
 }
 
-bool IsUnlit(const Material& m) { return (m.flags & stages::kMaterialUnlit) != 0; }
+bool IsUnlit(const Material& m) {
+  return (m.flags & stages::kMaterialUnlit) != 0;
+}
 
 void AddEffect(Plan& plan, const char* name, size_t materials, const char* what) {
   plan.parts.push_back({"effect", name, materials > 0,
@@ -45,45 +47,56 @@ void AddEffect(Plan& plan, const char* name, size_t materials, const char* what)
 
 void PlanEffects(Plan& plan, const std::vector<Material>& used) {
   const auto uses = [&](stages::Slot slot) {
-    return CountIf(used, [&](const Material& m) { return m.slots[static_cast<int>(slot)] != stages::kNone; });
+    return CountIf(
+        used, [&](const Material& m) { return m.slots[static_cast<int>(slot)] != stages::kNone; });
   };
   AddEffect(plan, "base colour textures", uses(stages::Slot::base_color), "with one");
   AddEffect(plan, "metal-roughness textures", uses(stages::Slot::metallic_roughness), "with one");
   AddEffect(plan, "normal mapping", uses(stages::Slot::normal), "with a normal map");
   AddEffect(plan, "emission textures", uses(stages::Slot::emissive), "with one");
-  AddEffect(plan, "specular textures", uses(stages::Slot::specular) + uses(stages::Slot::specular_color),
+  AddEffect(plan, "specular textures",
+            uses(stages::Slot::specular) + uses(stages::Slot::specular_color),
             "with one (KHR_materials_specular)");
-  AddEffect(plan, "transparency by alpha", CountIf(used, [](const Material& m) { return m.alpha_mode != AlphaMode::opaque; }),
+  AddEffect(plan, "transparency by alpha",
+            CountIf(used, [](const Material& m) { return m.alpha_mode != AlphaMode::opaque; }),
             "whose alpha is anywhere below its threshold");
   AddEffect(plan, "unlit surfaces", CountIf(used, IsUnlit), "with KHR_materials_unlit");
 }
 
 size_t CountLights(const SceneTables& tables, stages::LightType type) {
   const auto& lights = tables.lights.lights;
-  return static_cast<size_t>(std::count_if(lights.begin(), lights.end(), [&](const stages::Light& light) { return light.type == type; }));
+  return static_cast<size_t>(
+      std::count_if(lights.begin(), lights.end(),
+                    [&](const stages::Light& light) { return light.type == type; }));
 }
 
 void PlanLights(Plan& plan, const PreparedScene& scene) {
   const stages::LightTables& lights = scene.tables.lights;
   const size_t triangles = CountLights(scene.tables, stages::LightType::triangle) +
                            CountLights(scene.tables, stages::LightType::two_sided_triangle);
-  const size_t punctual = CountLights(scene.tables, stages::LightType::point) + CountLights(scene.tables, stages::LightType::spot);
+  const size_t punctual = CountLights(scene.tables, stages::LightType::point) +
+                          CountLights(scene.tables, stages::LightType::spot);
   const auto add = [&](const char* name, bool present, std::string why) {
     plan.parts.push_back({"light", name, present, std::move(why)});
   };
   add("light tree", lights.tree_probability > 0,
-      triangles + punctual == 0 ? "no emissive triangle, no point or spot light"
-                                : Count(triangles, "emissive triangle", "emissive triangles") + ", " +
-                                      Count(punctual, "point or spot light", "point or spot lights"));
+      triangles + punctual == 0
+          ? "no emissive triangle, no point or spot light"
+          : Count(triangles, "emissive triangle", "emissive triangles") + ", " +
+                Count(punctual, "point or spot light", "point or spot lights"));
   add("directional lights", !lights.infinite_lights.empty(),
-      lights.infinite_lights.empty() ? "none in the scene" : Count(lights.infinite_lights.size(), "light", "lights"));
+      lights.infinite_lights.empty() ? "none in the scene"
+                                     : Count(lights.infinite_lights.size(), "light", "lights"));
   add("environment", lights.environment.width > 0,
-      scene.environment_name.empty() ? "the scene has lights of its own and --env is not given" : scene.environment_name);
+      scene.environment_name.empty() ? "the scene has lights of its own and --env is not given"
+                                     : scene.environment_name);
 }
 
-void PlanStages(Plan& plan, const PreparedScene& scene, const std::vector<Material>& used, const RenderSettings& settings) {
+void PlanStages(Plan& plan, const PreparedScene& scene, const std::vector<Material>& used,
+                const RenderSettings& settings) {
   const stages::LightTables& lights = scene.tables.lights;
-  const bool any_light = lights.tree_probability > 0 || lights.infinite_probability > 0 || lights.environment_probability > 0;
+  const bool any_light = lights.tree_probability > 0 || lights.infinite_probability > 0 ||
+                         lights.environment_probability > 0;
   const auto add = [&](const char* name, bool present, std::string why) {
     plan.parts.push_back({"stage", name, present, std::move(why)});
   };
@@ -91,8 +104,12 @@ void PlanStages(Plan& plan, const PreparedScene& scene, const std::vector<Materi
   add("intersect", true, "rays that bounced, or passed a transparent layer");
   add("shade", true, Count(used.size(), "material", "materials") + " in use");
   add("shadow", any_light && settings.max_depth > 0,
-      !any_light ? "no light to sample" : settings.max_depth == 0 ? "--depth 0 shows emission alone" : "one shadow ray per vertex");
-  add("environment", lights.environment.width > 0, lights.environment.width > 0 ? "rays that leave the scene" : "rays that leave the scene are black");
+      !any_light                ? "no light to sample"
+      : settings.max_depth == 0 ? "--depth 0 shows emission alone"
+                                : "one shadow ray per vertex");
+  add("environment", lights.environment.width > 0,
+      lights.environment.width > 0 ? "rays that leave the scene"
+                                   : "rays that leave the scene are black");
   add("film", true, "exact sums, 128 bytes per pixel");
 }
 
@@ -111,21 +128,28 @@ void PlanFilm(Plan& plan, const RenderSettings& settings) {
   plan.sample_count = add("count", Aov::count);
 }
 
-void PlanBvh(Plan& plan, const PreparedScene& scene, const std::vector<Material>& used, const RenderSettings& settings) {
+void PlanBvh(Plan& plan, const PreparedScene& scene, const std::vector<Material>& used,
+             const RenderSettings& settings) {
   const auto add = [&](const char* name, bool present, std::string why) {
     plan.parts.push_back({"BVH", name, present, std::move(why)});
   };
-  const bool transparent = CountIf(used, [](const Material& m) { return m.alpha_mode != AlphaMode::opaque; }) > 0;
-  add("flat triangles", scene.placement.flat_triangles > 0, Count(scene.placement.flat_triangles, "triangle", "triangles"));
+  const bool transparent =
+      CountIf(used, [](const Material& m) { return m.alpha_mode != AlphaMode::opaque; }) > 0;
+  add("flat triangles", scene.placement.flat_triangles > 0,
+      Count(scene.placement.flat_triangles, "triangle", "triangles"));
   add("instances", !scene.placement.instanced.empty(),
-      scene.placement.instanced.empty() ? "every mesh is used once, or small enough to copy"
-                                        : Count(scene.placement.instanced.size(), "instance", "instances") + ", " +
-                                              Count(scene.placement.instanced_triangles, "triangle", "triangles") + " as drawn");
-  add("transparent level", transparent, transparent ? "shadow rays must ask some materials for their alpha" : "all is opaque");
-  add("ROBUST", settings.robust, settings.robust ? "no ray slips between triangles" : "--no-robust");
+      scene.placement.instanced.empty()
+          ? "every mesh is used once, or small enough to copy"
+          : Count(scene.placement.instanced.size(), "instance", "instances") + ", " +
+                Count(scene.placement.instanced_triangles, "triangle", "triangles") + " as drawn");
+  add("transparent level", transparent,
+      transparent ? "shadow rays must ask some materials for their alpha" : "all is opaque");
+  add("ROBUST", settings.robust,
+      settings.robust ? "no ray slips between triangles" : "--no-robust");
 }
 
-// Measured on this project's scenes: the wavefront wins wherever shading costs, and loses nowhere by much.
+// Measured on this project's scenes: the wavefront wins wherever shading costs, and loses nowhere
+// by much.
 void PlanExecutor(Plan& plan, const RenderSettings& settings) {
   if (settings.executor != Executor::automatic) {
     plan.executor = settings.executor;
@@ -160,7 +184,9 @@ Plan PlanScene(const RenderSettings& settings, const WarningSink& warn) {
     stages::ExecutorOptions options;
     options.arena = &threads.arena();
     options.threads = static_cast<uint32_t>(threads.count());
-    plan.dot = stages::MakeWavefront(context, KernelsFor(settings.isa), scene.tables.geometry.placements, options)->Dot();
+    plan.dot = stages::MakeWavefront(context, KernelsFor(settings.isa),
+                                     scene.tables.geometry.placements, options)
+                   ->Dot();
     return plan;
   });
 }
@@ -184,7 +210,8 @@ std::string Plan::Json() const {
   json["executor"] = Name(executor);
   json["parts"] = nlohmann::ordered_json::array();
   for (const PlanPart& part : parts) {
-    json["parts"].push_back({{"kind", part.kind}, {"name", part.name}, {"present", part.present}, {"why", part.why}});
+    json["parts"].push_back(
+        {{"kind", part.kind}, {"name", part.name}, {"present", part.present}, {"why", part.why}});
   }
   return json.dump(2) + "\n";
 }

@@ -1,4 +1,5 @@
-// Reads what a scene and its settings really use, and decides which stages, lobes, queues and channels exist.
+// Reads what a scene and its settings really use, and decides which stages, lobes, queues and
+// channels exist.
 #pragma once
 
 #include <string>
@@ -28,7 +29,9 @@ struct Plan {
   std::string dot;  // the stage graph in Graphviz's language
 
   /// Does the first hit of a path have to be recorded for an AOV?
-  bool first_hits() const { return film.albedo || film.normal || film.depth || film.object || film.material; }
+  bool first_hits() const {
+    return film.albedo || film.normal || film.depth || film.object || film.material;
+  }
   std::string Text() const;
   std::string Json() const;
 };

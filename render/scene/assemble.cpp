@@ -34,7 +34,8 @@ void MakeTextures(const ImportedScene& imported, SceneTables& tables, const Warn
   std::vector<EncodedImageView> images;
   for (const EncodedImage& image : imported.images) images.push_back({image.bytes, image.where});
   std::vector<TextureSourceView> sources;
-  for (const TextureSource& source : imported.texture_sources) sources.push_back({source.image, source.srgb});
+  for (const TextureSource& source : imported.texture_sources)
+    sources.push_back({source.image, source.srgb});
   BuildTextures(images, sources, tables.textures, warn);
 }
 
@@ -80,7 +81,8 @@ bool HasOwnLight(const ImportedScene& imported, const SceneTables& tables) {
          std::any_of(tables.geometry.placements.begin(), tables.geometry.placements.end(), emits);
 }
 
-void MakeEnvironment(const ImportedScene& imported, const AssembleOptions& options, PreparedScene& scene) {
+void MakeEnvironment(const ImportedScene& imported, const AssembleOptions& options,
+                     PreparedScene& scene) {
   stages::Environment& environment = scene.tables.lights.environment;
   if (!options.environment.empty()) {
     EnvironmentMap image = ReadEnvironment(options.environment, options.warn);
@@ -91,7 +93,8 @@ void MakeEnvironment(const ImportedScene& imported, const AssembleOptions& optio
     BuildEnvironment(environment, 1, kRows, NeutralSky(kRows));
     scene.environment_name = "(neutral)";
     if (options.warn) {
-      options.warn(imported.summary.file + ": the scene has no light; using a neutral sky (--env takes another)");
+      options.warn(imported.summary.file +
+                   ": the scene has no light; using a neutral sky (--env takes another)");
     }
   }
 }
@@ -99,7 +102,8 @@ void MakeEnvironment(const ImportedScene& imported, const AssembleOptions& optio
 std::vector<int32_t> TriangleCounts(const SceneTables& tables, const PlacementPlan& plan) {
   const stages::GeometryTables& g = tables.geometry;
   std::vector<int32_t> counts(g.placements.size());
-  for (const PlacementPlan::Flat& flat : plan.flat) counts[flat.placement] = g.shapes[flat.shape].triangle_count;
+  for (const PlacementPlan::Flat& flat : plan.flat)
+    counts[flat.placement] = g.shapes[flat.shape].triangle_count;
   for (const PlacementPlan::Instanced& instance : plan.instanced) {
     const stages::Mesh& mesh = g.meshes[instance.mesh];
     for (int32_t s = 0; s < mesh.shape_count; ++s) {
@@ -117,7 +121,8 @@ PreparedScene AssembleScene(ImportedScene imported, const AssembleOptions& optio
   Stopwatch watch;
 
   const CameraNode camera = ChooseCamera(imported, options.camera, options.warn);
-  const auto [width, height] = ImageSize(camera, options.width, options.height, options.default_width);
+  const auto [width, height] =
+      ImageSize(camera, options.width, options.height, options.default_width);
   scene.width = width;
   scene.height = height;
   scene.camera_name = camera.name;
@@ -137,8 +142,10 @@ PreparedScene AssembleScene(ImportedScene imported, const AssembleOptions& optio
 
   MakeEnvironment(imported, options, scene);
   std::vector<PunctualInput> punctual;
-  for (const PunctualLight& light : imported.lights) punctual.push_back(ToPunctual(light, tables.origin));
-  BuildLightTree(tables, CollectEmission(tables, TriangleCounts(tables, scene.placement)), punctual);
+  for (const PunctualLight& light : imported.lights)
+    punctual.push_back(ToPunctual(light, tables.origin));
+  BuildLightTree(tables, CollectEmission(tables, TriangleCounts(tables, scene.placement)),
+                 punctual);
   scene.times.lights = watch.Lap();
   return scene;
 }

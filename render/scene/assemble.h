@@ -1,4 +1,5 @@
-// Brings an imported file, its images and its surroundings together into the tables that the kernels read.
+// Brings an imported file, its images and its surroundings together into the tables that the
+// kernels read.
 #pragma once
 
 #include <string>
@@ -12,7 +13,8 @@ namespace carpool::render {
 
 struct AssembleOptions {
   std::string camera;       // name or index; empty: the first
-  std::string environment;  // .exr or .hdr lat-long file; empty: none, or a neutral one in a scene without light
+  std::string environment;  // .exr or .hdr lat-long file; empty: none, or a neutral one in a scene
+                            // without light
   int width = 0, height = 0;  // 0: by the camera's aspect
   int default_width = 1280;
   WarningSink warn;

@@ -12,7 +12,9 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-Vec3 Column(const Affine& m, int c) { return {m[c], m[4 + c], m[8 + c]}; }
+Vec3 Column(const Affine& m, int c) {
+  return {m[c], m[4 + c], m[8 + c]};
+}
 Vec3 Cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
@@ -55,10 +57,12 @@ Bounds SceneBounds(const ImportedScene& scene) {
       const Bounds& b = shapes[mesh.first_shape + s];
       if (b.empty) continue;
       for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 p = {(corner & 1) != 0 ? b.high[0] : b.low[0], (corner & 2) != 0 ? b.high[1] : b.low[1],
+        const Vec3 p = {(corner & 1) != 0 ? b.high[0] : b.low[0],
+                        (corner & 2) != 0 ? b.high[1] : b.low[1],
                         (corner & 4) != 0 ? b.high[2] : b.low[2]};
         Vec3 q;
-        for (int r = 0; r < 3; ++r) q[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
+        for (int r = 0; r < 3; ++r)
+          q[r] = m[4 * r] * p[0] + m[4 * r + 1] * p[1] + m[4 * r + 2] * p[2] + m[4 * r + 3];
         all.Add(q);
       }
     }
@@ -104,10 +108,12 @@ std::string ListCameras(const ImportedScene& scene) {
 
 }  // namespace
 
-CameraNode ChooseCamera(const ImportedScene& scene, const std::string& wanted, const WarningSink& warn) {
+CameraNode ChooseCamera(const ImportedScene& scene, const std::string& wanted,
+                        const WarningSink& warn) {
   if (wanted.empty()) {
     if (!scene.cameras.empty()) return scene.cameras.front();
-    if (warn) warn(scene.summary.file + ": the scene has no camera; using one that frames everything");
+    if (warn)
+      warn(scene.summary.file + ": the scene has no camera; using one that frames everything");
     return FramingCamera(scene);
   }
   for (const CameraNode& camera : scene.cameras) {
@@ -116,14 +122,17 @@ CameraNode ChooseCamera(const ImportedScene& scene, const std::string& wanted, c
   size_t index = 0;
   const char* const end = wanted.data() + wanted.size();
   const auto [stop, error] = std::from_chars(wanted.data(), end, index);
-  if (error == std::errc() && stop == end && index < scene.cameras.size()) return scene.cameras[index];
-  throw InputError(scene.summary.file, "there is no camera '" + wanted + "'; --camera takes one of: " + ListCameras(scene));
+  if (error == std::errc() && stop == end && index < scene.cameras.size())
+    return scene.cameras[index];
+  throw InputError(scene.summary.file, "there is no camera '" + wanted +
+                                           "'; --camera takes one of: " + ListCameras(scene));
 }
 
 std::array<int, 2> ImageSize(const CameraNode& camera, int width, int height, int default_width) {
   if (width > 0 && height > 0) return {width, height};
   double aspect = 16.0 / 9.0;
-  if (camera.orthographic && camera.ymag != 0 && camera.xmag != 0) aspect = std::abs(camera.xmag / camera.ymag);
+  if (camera.orthographic && camera.ymag != 0 && camera.xmag != 0)
+    aspect = std::abs(camera.xmag / camera.ymag);
   if (!camera.orthographic && camera.aspect > 0) aspect = camera.aspect;
   const double rows = std::round(default_width / aspect);
   return {default_width, static_cast<int>(std::clamp(rows, 1.0, 16.0 * default_width))};
@@ -144,7 +153,8 @@ stages::Camera MakeCamera(const CameraNode& camera, int width, int height) {
   const double aspect = static_cast<double>(width) / height;
   record.orthographic = camera.orthographic ? 1 : 0;
   if (camera.orthographic) {
-    // The wider of the two magnifications holds, so that nothing the file wants to be seen is cut off.
+    // The wider of the two magnifications holds, so that nothing the file wants to be seen is cut
+    // off.
     const double half_height = std::max(std::abs(camera.ymag), std::abs(camera.xmag) / aspect);
     record.half_height = static_cast<float>(half_height);
     record.half_width = static_cast<float>(half_height * aspect);

@@ -20,7 +20,9 @@ using stages::SceneTables;
 using stages::Texture;
 using stages::TextureSlot;
 
-double Luminance(const std::array<double, 3>& c) { return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]; }
+double Luminance(const std::array<double, 3>& c) {
+  return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+}
 
 struct Uv {
   double u = 0, v = 0;
@@ -49,24 +51,29 @@ size_t Wrapped(double unit, int size, int32_t mode) {
   return static_cast<size_t>(std::clamp(static_cast<int>(turn * size), 0, size - 1));
 }
 
-/// Mean luminance of a texture over a triangle: 16 points of the mip level whose texels are about a quarter
-/// of the triangle's extent.
-double MeanTexture(const SceneTables& scene, const TextureSlot& slot, const std::array<Uv, 3>& corners,
-                   const float factor[3]) {
+/// Mean luminance of a texture over a triangle: 16 points of the mip level whose texels are about a
+/// quarter of the triangle's extent.
+double MeanTexture(const SceneTables& scene, const TextureSlot& slot,
+                   const std::array<Uv, 3>& corners, const float factor[3]) {
   const Texture& texture = scene.textures.textures[slot.texture];
   std::array<Uv, 3> uv;
   for (int i = 0; i < 3; ++i) {
     const float* m = slot.transform;
     const Uv& in = corners[i];
-    uv[i] = slot.has_transform != 0 ? Uv{m[0] * in.u + m[1] * in.v + m[2], m[3] * in.u + m[4] * in.v + m[5]} : in;
+    uv[i] = slot.has_transform != 0
+                ? Uv{m[0] * in.u + m[1] * in.v + m[2], m[3] * in.u + m[4] * in.v + m[5]}
+                : in;
   }
   const auto extent = [&](double Uv::*axis) {
-    return std::max({uv[0].*axis, uv[1].*axis, uv[2].*axis}) - std::min({uv[0].*axis, uv[1].*axis, uv[2].*axis});
+    return std::max({uv[0].*axis, uv[1].*axis, uv[2].*axis}) -
+           std::min({uv[0].*axis, uv[1].*axis, uv[2].*axis});
   };
   const double texels = std::max(extent(&Uv::u) * texture.width, extent(&Uv::v) * texture.height);
   const double wanted = std::log2(std::max(texels / 4, 1.0));
-  const int level = std::isfinite(wanted) ? std::clamp(static_cast<int>(wanted), 0, texture.levels - 1) : 0;
-  const int width = std::max(1, texture.width >> level), height = std::max(1, texture.height >> level);
+  const int level =
+      std::isfinite(wanted) ? std::clamp(static_cast<int>(wanted), 0, texture.levels - 1) : 0;
+  const int width = std::max(1, texture.width >> level),
+            height = std::max(1, texture.height >> level);
   const int words = texture.format == stages::TexelFormat::rgba16 ? 2 : 1;
   double sum = 0;
   constexpr int kAcross = 4;
@@ -113,7 +120,8 @@ TriangleEmission EmissionOf(const SceneTables& scene, int32_t placement, int32_t
         Luminance({material.emissive[0], material.emissive[1], material.emissive[2]}));
   } else {
     const TextureSlot& s = scene.textures.slots[slot];
-    const std::array<Uv, 3> corners = {VertexUv(g, p, index[0], s.uv_set), VertexUv(g, p, index[1], s.uv_set),
+    const std::array<Uv, 3> corners = {VertexUv(g, p, index[0], s.uv_set),
+                                       VertexUv(g, p, index[1], s.uv_set),
                                        VertexUv(g, p, index[2], s.uv_set)};
     e.radiance_luminance = static_cast<float>(MeanTexture(scene, s, corners, material.emissive));
   }

@@ -8,8 +8,9 @@
 
 namespace carpool::render {
 
-/// All triangles of the flat and instanced placements whose material is emissive, placement by placement. Textures are
-/// averaged from a coarse mip level: the estimate steers light selection, never the image's mean.
+/// All triangles of the flat and instanced placements whose material is emissive, placement by
+/// placement. Textures are averaged from a coarse mip level: the estimate steers light selection,
+/// never the image's mean.
 std::vector<TriangleEmission> CollectEmission(const stages::SceneTables& scene,
                                               const std::vector<int32_t>& triangles_of_placement);
 

@@ -12,7 +12,8 @@ using stages::Texture;
 
 /// Smallest alpha of the finest level, 0..1; filtering never goes below it.
 float LeastAlpha(const stages::TextureTables& tables, const Texture& texture) {
-  const size_t count = size_t{static_cast<uint32_t>(texture.width)} * static_cast<uint32_t>(texture.height);
+  const size_t count =
+      size_t{static_cast<uint32_t>(texture.width)} * static_cast<uint32_t>(texture.height);
   const uint32_t* const words = &tables.words[texture.level_offset[0]];
   uint32_t least = 0xffff;
   if (texture.format == stages::TexelFormat::rgba16) {
@@ -49,7 +50,8 @@ void SimplifyOpacity(std::vector<Material>& materials, const stages::TextureTabl
       alpha *= least[texture];
     }
     const bool full = m.alpha_mode == AlphaMode::mask ? alpha >= m.alpha_cutoff : alpha >= 1;
-    if (full && !HasTranslucentVertices(geometry, static_cast<int32_t>(i))) m.alpha_mode = AlphaMode::opaque;
+    if (full && !HasTranslucentVertices(geometry, static_cast<int32_t>(i)))
+      m.alpha_mode = AlphaMode::opaque;
   }
 }
 

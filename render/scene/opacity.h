@@ -1,4 +1,5 @@
-// Finds materials that ask for alpha but are opaque everywhere, so that nothing is simulated for them.
+// Finds materials that ask for alpha but are opaque everywhere, so that nothing is simulated for
+// them.
 #pragma once
 
 #include <vector>
@@ -8,8 +9,9 @@
 
 namespace carpool::render {
 
-/// Sets alpha_mode to opaque where factor, texture and vertex colours can only give an opacity of 1.
-void SimplifyOpacity(std::vector<stages::Material>& materials, const stages::TextureTables& textures,
-                     const stages::GeometryTables& geometry);
+/// Sets alpha_mode to opaque where factor, texture and vertex colours can only give an opacity
+/// of 1.
+void SimplifyOpacity(std::vector<stages::Material>& materials,
+                     const stages::TextureTables& textures, const stages::GeometryTables& geometry);
 
 }  // namespace carpool::render

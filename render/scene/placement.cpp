@@ -55,12 +55,14 @@ void TransformPoints(const float* in, float* out, int32_t count, const Matrix& m
   for (int32_t v = 0; v < count; ++v, in += 3, out += 3) {
     const double x = in[0], y = in[1], z = in[2];
     for (int r = 0; r < 3; ++r) {
-      out[r] = static_cast<float>(m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3]);
+      out[r] =
+          static_cast<float>(m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3]);
     }
   }
 }
 
-// Directions through a 3x3 matrix, normalised; a vanishing one becomes zero, which readers replace by the triangle's.
+// Directions through a 3x3 matrix, normalised; a vanishing one becomes zero, which readers replace
+// by the triangle's.
 template <int kStride>
 void TransformDirections(const float* in, float* out, int32_t count, const std::array<double, 9>& m,
                          double w_sign) {
@@ -106,16 +108,21 @@ class Placer {
  private:
   uint64_t Triangles(const Mesh& mesh) const {
     uint64_t count = 0;
-    for (int32_t s = 0; s < mesh.shape_count; ++s) count += g_.shapes[mesh.first_shape + s].triangle_count;
+    for (int32_t s = 0; s < mesh.shape_count; ++s)
+      count += g_.shapes[mesh.first_shape + s].triangle_count;
     return count;
   }
   // Streams may be overwritten with world-space values when nobody else reads them.
   bool OwnsStreams(const Shape& shape) const {
-    const auto sole = [&](int32_t offset) { return offset == kNone || float_users_.at(offset) == 1; };
+    const auto sole = [&](int32_t offset) {
+      return offset == kNone || float_users_.at(offset) == 1;
+    };
     return sole(shape.positions) && sole(shape.normals) && sole(shape.tangents) &&
            index_users_.at(shape.first_index) == 1;
   }
-  bool Copied(int32_t mesh) const { return Triangles(g_.meshes[mesh]) * uses_[mesh] <= kCopyTriangles; }
+  bool Copied(int32_t mesh) const {
+    return Triangles(g_.meshes[mesh]) * uses_[mesh] <= kCopyTriangles;
+  }
 
   Placement MakePlacement(const Shape& shape, int32_t object) const {
     Placement p;
@@ -136,7 +143,8 @@ class Placer {
   int32_t Extend(std::vector<T>& stream, size_t count) {
     const size_t offset = stream.size();
     if (offset + count > kMostElements) {
-      throw InputError(where_, "the scene has more than 2^31 vertex values; split it or use fewer copies");
+      throw InputError(where_,
+                       "the scene has more than 2^31 vertex values; split it or use fewer copies");
     }
     stream.resize(offset + count);
     return static_cast<int32_t>(offset);
@@ -179,7 +187,8 @@ class Placer {
     const size_t count = size_t{3} * shape.triangle_count;
     if (!in_place) {
       p.first_index = Extend(g_.indices, count);
-      std::copy_n(g_.indices.begin() + shape.first_index, count, g_.indices.begin() + p.first_index);
+      std::copy_n(g_.indices.begin() + shape.first_index, count,
+                  g_.indices.begin() + p.first_index);
     }
     for (size_t i = 0; i < count; i += 3) {
       std::swap(g_.indices[p.first_index + i + 1], g_.indices[p.first_index + i + 2]);
@@ -191,7 +200,8 @@ class Placer {
     const Mesh& mesh = g_.meshes[instance.mesh];
     plan_.instanced.push_back({instance.mesh, static_cast<int32_t>(g_.placements.size())});
     const std::array<double, 9> normal = NormalMatrix(m);
-    double largest = 0;  // scaled, so that tiny and huge instances keep their normals in float range
+    double largest =
+        0;  // scaled, so that tiny and huge instances keep their normals in float range
     for (const double value : normal) largest = std::max(largest, std::abs(value));
     for (int32_t s = 0; s < mesh.shape_count; ++s) {
       const Shape& shape = g_.shapes[mesh.first_shape + s];
@@ -206,7 +216,7 @@ class Placer {
 
   stages::GeometryTables& g_;
   const std::string& where_;
-  std::vector<uint32_t> uses_;  // instances per mesh
+  std::vector<uint32_t> uses_;                                  // instances per mesh
   std::unordered_map<int32_t, int> float_users_, index_users_;  // shapes per stream offset
   PlacementPlan plan_;
 };

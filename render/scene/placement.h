@@ -1,4 +1,5 @@
-// Decides how each instance is put into the scene, baked or as an Embree instance, and makes the kernels' placements.
+// Decides how each instance is put into the scene, baked or as an Embree instance, and makes the
+// kernels' placements.
 #pragma once
 
 #include <string>
@@ -8,7 +9,8 @@
 
 namespace carpool::render {
 
-/// PlacementPlan tells the BVH build what was decided: each mesh instance is baked flat, or stays an instance of its mesh.
+/// PlacementPlan tells the BVH build what was decided: each mesh instance is baked flat, or stays
+/// an instance of its mesh.
 struct PlacementPlan {
   struct Flat {
     int32_t placement = 0;  // its vertices are in world space
@@ -24,10 +26,11 @@ struct PlacementPlan {
   uint64_t instanced_triangles = 0;  // as drawn
 };
 
-/// PlaceInstances fills `scene.geometry.placements` from shapes, meshes and instances, whose matrices are already
-/// relative to `scene.origin`. Meshes used once are baked in place (one BVH level is faster than two), small ones
-/// used often are copied, the rest is instanced and never copied. Instances with a zero scale that leaves less than a
-/// plane vanish. Throws InputError(`where`, ...) if vertex streams outgrow 2^31 - 1 elements.
+/// PlaceInstances fills `scene.geometry.placements` from shapes, meshes and instances, whose
+/// matrices are already relative to `scene.origin`. Meshes used once are baked in place (one BVH
+/// level is faster than two), small ones used often are copied, the rest is instanced and never
+/// copied. Instances with a zero scale that leaves less than a plane vanish. Throws
+/// InputError(`where`, ...) if vertex streams outgrow 2^31 - 1 elements.
 PlacementPlan PlaceInstances(stages::SceneTables& scene, const std::string& where);
 
 }  // namespace carpool::render

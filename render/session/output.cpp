@@ -43,8 +43,10 @@ class Layers {
 
   std::vector<ExrChannelView> Views() const {
     std::vector<ExrChannelView> views;
-    for (const auto& [name, plane] : floats_) views.push_back({name, std::span<const float>(plane)});
-    for (const auto& [name, plane] : ids_) views.push_back({name, std::span<const uint32_t>(plane)});
+    for (const auto& [name, plane] : floats_)
+      views.push_back({name, std::span<const float>(plane)});
+    for (const auto& [name, plane] : ids_)
+      views.push_back({name, std::span<const uint32_t>(plane)});
     return views;
   }
 
@@ -102,10 +104,12 @@ void WriteImage(const std::string& path, const FilmAccumulator& film, const Plan
   if (plan.film.object) layers.AddId("objectId", [&](uint32_t p) { return film.Object(p); });
   if (plan.film.material) layers.AddId("materialId", [&](uint32_t p) { return film.Material(p); });
   const std::vector<ExrChannelView> views = layers.Views();
-  WriteExr(path, static_cast<int>(film.width()), static_cast<int>(film.height()), views, Attributes(summary));
+  WriteExr(path, static_cast<int>(film.width()), static_cast<int>(film.height()), views,
+           Attributes(summary));
 }
 
-void WritePicture(const std::string& path, const FilmAccumulator& film, float exposure_ev, bool preview) {
+void WritePicture(const std::string& path, const FilmAccumulator& film, float exposure_ev,
+                  bool preview) {
   const RgbPlane beauty = preview ? ResolvePreview(film) : ResolveBeauty(film);
   std::vector<uint8_t> codes(beauty.size());
   const float scale = ExposureScale(exposure_ev);

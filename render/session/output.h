@@ -14,7 +14,8 @@ void WriteImage(const std::string& path, const stages::FilmAccumulator& film, co
                 const RenderSummary& summary);
 
 /// Tone-mapped beauty. With `preview`, pixels without a sample borrow a neighbour's.
-void WritePicture(const std::string& path, const stages::FilmAccumulator& film, float exposure_ev, bool preview);
+void WritePicture(const std::string& path, const stages::FilmAccumulator& film, float exposure_ev,
+                  bool preview);
 
 /// A text file, atomically.
 void WriteText(const std::string& path, const std::string& text);

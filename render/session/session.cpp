@@ -1,4 +1,5 @@
-// The life of a render: passes that grow until samples, time or noise say stop, previews between, files at the end.
+// The life of a render: passes that grow until samples, time or noise say stop, previews between,
+// files at the end.
 #include "render/session/session.h"
 
 #include <algorithm>
@@ -25,13 +26,19 @@ class PassLoop {
  public:
   PassLoop(Workspace& workspace, const RenderSettings& settings, const std::atomic<bool>& stop,
            const ProgressSink& progress, Clock::time_point begin, RenderSummary& summary)
-      : w_(workspace), settings_(settings), user_stop_(stop), progress_(progress), begin_(begin), summary_(summary) {}
+      : w_(workspace),
+        settings_(settings),
+        user_stop_(stop),
+        progress_(progress),
+        begin_(begin),
+        summary_(summary) {}
 
   void Run() {
     if (!settings_.preview_path.empty()) FirstPreview();
     while (!Finished()) {
       Pass({.first_sample = done_, .sample_count = NextCount()});
-      if (!settings_.preview_path.empty() && SecondsSince(preview_time_) >= kPreviewSeconds) SavePreview(false);
+      if (!settings_.preview_path.empty() && SecondsSince(preview_time_) >= kPreviewSeconds)
+        SavePreview(false);
     }
     if (!settings_.preview_path.empty()) SavePreview(false);
     if (noise_ < 0) noise_ = EstimateNoise(w_.film());
@@ -44,17 +51,20 @@ class PassLoop {
   }
 
  private:
-  static constexpr double kPassSeconds = 2;     // a pass's end costs a fraction of a batch per worker
+  static constexpr double kPassSeconds = 2;  // a pass's end costs a fraction of a batch per worker
   static constexpr double kPreviewSeconds = 5;  // between refreshed previews
 
   bool NoiseReached() const { return noise_ >= 0 && noise_ <= settings_.noise_target; }
-  bool TimeIsUp() const { return settings_.time_seconds > 0 && SecondsSince(render_begin_) >= settings_.time_seconds; }
+  bool TimeIsUp() const {
+    return settings_.time_seconds > 0 && SecondsSince(render_begin_) >= settings_.time_seconds;
+  }
   bool Finished() const {
-    return stopped_ || user_stop_ || done_ >= static_cast<uint32_t>(settings_.samples) || TimeIsUp() ||
-           (settings_.noise_target > 0 && NoiseReached());
+    return stopped_ || user_stop_ || done_ >= static_cast<uint32_t>(settings_.samples) ||
+           TimeIsUp() || (settings_.noise_target > 0 && NoiseReached());
   }
 
-  /// Samples of the next pass: one to start with, then as many as fill kPassSeconds, in whole rounds of the scrambles.
+  /// Samples of the next pass: one to start with, then as many as fill kPassSeconds, in whole
+  /// rounds of the scrambles.
   uint32_t NextCount() const {
     const uint32_t left = static_cast<uint32_t>(settings_.samples) - done_;
     if (seconds_per_sample_ <= 0) return 1;
@@ -77,7 +87,8 @@ class PassLoop {
     if (stopped_) return;
     Pass({.first_sample = 0, .sample_count = 1, .phases = 0xfe}, false);
     SavePreview(true);
-    if (!stopped_) Pass({.first_sample = 0, .sample_count = 1, .phases = stages::kAllPhases & ~0xffu});
+    if (!stopped_)
+      Pass({.first_sample = 0, .sample_count = 1, .phases = stages::kAllPhases & ~0xffu});
   }
 
   void SavePreview(bool partial) {
@@ -113,13 +124,15 @@ class PassLoop {
     const double samples = done_ + samples_in_pass;
     update.fraction = samples / settings_.samples;
     const double elapsed = SecondsSince(render_begin_);
-    if (settings_.time_seconds > 0) update.fraction = std::max(update.fraction, elapsed / settings_.time_seconds);
+    if (settings_.time_seconds > 0)
+      update.fraction = std::max(update.fraction, elapsed / settings_.time_seconds);
     update.fraction = std::min(update.fraction, 1.0);
     update.samples_done = static_cast<int>(samples);
     update.samples_total = settings_.samples;
     update.elapsed_s = SecondsSince(begin_);
     update.noise = noise_;
-    if (pass_begin > 0) update.rays_per_second = static_cast<double>(summary_.rays.total()) / pass_begin;
+    if (pass_begin > 0)
+      update.rays_per_second = static_cast<double>(summary_.rays.total()) / pass_begin;
     progress_(update);
   }
 
@@ -165,15 +178,16 @@ void Save(const Workspace& w, const RenderSettings& settings, RenderSummary& sum
   summary.rejected_samples = CountSamples(w.film()).rejected;
   summary.output = settings.output_path;
   WriteImage(settings.output_path, w.film(), w.plan(), summary);
-  if (settings.write_png) WritePicture(PngPath(settings.output_path), w.film(), settings.exposure, false);
+  if (settings.write_png)
+    WritePicture(PngPath(settings.output_path), w.film(), settings.exposure, false);
   summary.save_seconds = SecondsSince(begin);
   if (!settings.stats_path.empty()) WriteText(settings.stats_path, summary.Json());
 }
 
 }  // namespace
 
-RenderSummary Render(const RenderSettings& settings, const std::atomic<bool>& stop, const ProgressSink& progress,
-                     const WarningSink& warn) {
+RenderSummary Render(const RenderSettings& settings, const std::atomic<bool>& stop,
+                     const ProgressSink& progress, const WarningSink& warn) {
   const Clock::time_point begin = Clock::now();
   CheckSettings(settings);
   CheckOutputs(settings);

@@ -14,7 +14,8 @@ namespace carpool::render {
 
 /// What a render did, for people (`Text`) and for scripts (`Json`, the content of --stats).
 struct RenderSummary {
-  ExitCode code = ExitCode::done;  // done, no (noise target missed in the time given) or interrupted
+  ExitCode code =
+      ExitCode::done;  // done, no (noise target missed in the time given) or interrupted
   std::string output, scene, camera, environment, executor, executor_reason, isa;
   int width = 0, height = 0;
   int samples = 0;  // that every pixel has at least
@@ -31,9 +32,10 @@ struct RenderSummary {
   std::string Json() const;
 };
 
-/// Render does what `settings` say. `stop` may be set at any time, from any thread or a signal handler: rendering ends
-/// within a fraction of a second and what there is is saved. Throws Error; an existing output file is then untouched.
-RenderSummary Render(const RenderSettings& settings, const std::atomic<bool>& stop, const ProgressSink& progress,
-                     const WarningSink& warn);
+/// Render does what `settings` say. `stop` may be set at any time, from any thread or a signal
+/// handler: rendering ends within a fraction of a second and what there is is saved. Throws Error;
+/// an existing output file is then untouched.
+RenderSummary Render(const RenderSettings& settings, const std::atomic<bool>& stop,
+                     const ProgressSink& progress, const WarningSink& warn);
 
 }  // namespace carpool::render

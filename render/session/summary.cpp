@@ -19,7 +19,9 @@ __attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...
   return line;
 }
 
-double Mebibytes(uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
+double Mebibytes(uint64_t bytes) {
+  return static_cast<double>(bytes) / (1 << 20);
+}
 
 /// Scheduler time over the worker time of the last pass.
 double SchedulerShare(const RunReport& r) {
@@ -35,28 +37,52 @@ std::string RenderSummary::Text() const {
   if (noise >= 0) out << Format(", noise %.2f %%", 100 * noise);
   out << "\n";
   const double seconds = render_seconds > 0 ? render_seconds : 1e-9;
-  out << Format("  %.2f s load, %.2f s BVH, %.2f s render, %.2f s save\n", load_seconds, bvh_seconds, render_seconds, save_seconds);
-  out << Format("  %s on %s (%s): %.2f M rays/s, %.3f M samples/s\n", executor.c_str(), isa.c_str(), executor_reason.c_str(),
-                static_cast<double>(rays.total()) / seconds / 1e6, static_cast<double>(rays.camera) / seconds / 1e6);
-  out << Format("  memory: %.1f MiB BVH, %.1f MiB film, %.1f MiB path state and queues\n", Mebibytes(bvh_bytes),
-                Mebibytes(film_bytes), Mebibytes(state_bytes + queue_bytes));
-  if (!schedule.stages.empty()) out << Format("  scheduler: %.2f %% of worker time\n", 100 * SchedulerShare(schedule));
+  out << Format("  %.2f s load, %.2f s BVH, %.2f s render, %.2f s save\n", load_seconds,
+                bvh_seconds, render_seconds, save_seconds);
+  out << Format("  %s on %s (%s): %.2f M rays/s, %.3f M samples/s\n", executor.c_str(), isa.c_str(),
+                executor_reason.c_str(), static_cast<double>(rays.total()) / seconds / 1e6,
+                static_cast<double>(rays.camera) / seconds / 1e6);
+  out << Format("  memory: %.1f MiB BVH, %.1f MiB film, %.1f MiB path state and queues\n",
+                Mebibytes(bvh_bytes), Mebibytes(film_bytes), Mebibytes(state_bytes + queue_bytes));
+  if (!schedule.stages.empty())
+    out << Format("  scheduler: %.2f %% of worker time\n", 100 * SchedulerShare(schedule));
   if (rejected_samples > 0) {
-    out << "  " << rejected_samples << " samples were not finite or too large for the film and were rejected\n";
+    out << "  " << rejected_samples
+        << " samples were not finite or too large for the film and were rejected\n";
   }
   return out.str();
 }
 
 std::string RenderSummary::Json() const {
   nlohmann::ordered_json json = {
-      {"version", kVersion}, {"scene", scene}, {"output", output}, {"camera", camera}, {"environment", environment},
-      {"executor", executor}, {"executor_reason", executor_reason}, {"isa", isa}, {"width", width}, {"height", height},
-      {"samples", samples}, {"seed", seed}, {"noise", noise}, {"rejected_samples", rejected_samples},
+      {"version", kVersion},
+      {"scene", scene},
+      {"output", output},
+      {"camera", camera},
+      {"environment", environment},
+      {"executor", executor},
+      {"executor_reason", executor_reason},
+      {"isa", isa},
+      {"width", width},
+      {"height", height},
+      {"samples", samples},
+      {"seed", seed},
+      {"noise", noise},
+      {"rejected_samples", rejected_samples},
       {"rays", {{"camera", rays.camera}, {"bounce", rays.bounce}, {"shadow", rays.shadow}}},
-      {"seconds", {{"load", load_seconds}, {"bvh", bvh_seconds}, {"render", render_seconds}, {"save", save_seconds},
-                   {"first_preview", first_preview_seconds}}},
-      {"bytes", {{"bvh", bvh_bytes}, {"film", film_bytes}, {"path_state", state_bytes}, {"queues", queue_bytes}}}};
-  if (!schedule.stages.empty()) json["last_pass"] = nlohmann::ordered_json::parse(schedule.to_json());
+      {"seconds",
+       {{"load", load_seconds},
+        {"bvh", bvh_seconds},
+        {"render", render_seconds},
+        {"save", save_seconds},
+        {"first_preview", first_preview_seconds}}},
+      {"bytes",
+       {{"bvh", bvh_bytes},
+        {"film", film_bytes},
+        {"path_state", state_bytes},
+        {"queues", queue_bytes}}}};
+  if (!schedule.stages.empty())
+    json["last_pass"] = nlohmann::ordered_json::parse(schedule.to_json());
   return json.dump(2) + "\n";
 }
 

@@ -10,14 +10,18 @@ namespace {
 
 uint64_t MemoryBytes(const RenderSettings& settings, int threads) {
   if (settings.memory_mb > 0) return uint64_t{static_cast<uint32_t>(settings.memory_mb)} << 20;
-  return (uint64_t{64} << 20) + (uint64_t{4} << 20) * static_cast<uint64_t>(std::max(0, threads - 2));
+  return (uint64_t{64} << 20) +
+         (uint64_t{4} << 20) * static_cast<uint64_t>(std::max(0, threads - 2));
 }
 
 carpool::Policy SchedulerPolicy(Policy policy) {
   switch (policy) {
-    case Policy::fullest: return carpool::Policy::fullest_first();
-    case Policy::oldest: return carpool::Policy::oldest_first();
-    case Policy::deepest: break;
+    case Policy::fullest:
+      return carpool::Policy::fullest_first();
+    case Policy::oldest:
+      return carpool::Policy::oldest_first();
+    case Policy::deepest:
+      break;
   }
   return carpool::Policy::deepest_first();
 }
@@ -33,9 +37,11 @@ const stages::Kernels& KernelsFor(Isa isa) {
   const stages::Kernels* const kernels = stages::FindKernels(Name(isa));
   if (kernels != nullptr) return *kernels;
   std::string available;
-  for (const stages::Kernels& k : stages::AvailableKernels()) available += (available.empty() ? "" : ", ") + std::string(k.isa);
-  throw Error(ExitCode::usage, "--isa " + std::string(Name(isa)) + ": this machine has " +
-                                   (available.empty() ? "none of SSE4.2, AVX2, AVX-512" : available));
+  for (const stages::Kernels& k : stages::AvailableKernels())
+    available += (available.empty() ? "" : ", ") + std::string(k.isa);
+  throw Error(ExitCode::usage,
+              "--isa " + std::string(Name(isa)) + ": this machine has " +
+                  (available.empty() ? "none of SSE4.2, AVX2, AVX-512" : available));
 }
 
 PreparedScene LoadScene(const RenderSettings& settings, const WarningSink& warn) {
@@ -52,7 +58,8 @@ PreparedScene LoadScene(const RenderSettings& settings, const WarningSink& warn)
   assemble.warn = warn;
   const auto begin = std::chrono::steady_clock::now();
   ImportedScene imported = LoadGltf(settings.scene_path, load);
-  const double import = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double import =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   PreparedScene scene = AssembleScene(std::move(imported), assemble);
   scene.times.import = import;
   return scene;
@@ -92,9 +99,10 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
   options.batch_items = static_cast<uint32_t>(settings.batch_items);
   options.policy = SchedulerPolicy(settings.policy);
   executor_reason_ = plan_.executor_reason;
-  executor_ = plan_.executor == Executor::megakernel
-                  ? stages::MakeMegakernel(context_, kernels_, options)
-                  : stages::MakeWavefront(context_, kernels_, scene_.tables.geometry.placements, options);
+  executor_ =
+      plan_.executor == Executor::megakernel
+          ? stages::MakeMegakernel(context_, kernels_, options)
+          : stages::MakeWavefront(context_, kernels_, scene_.tables.geometry.placements, options);
 }
 
 }  // namespace carpool::render

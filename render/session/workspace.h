@@ -1,4 +1,5 @@
-// Everything one render holds in memory, put together in order: tables, BVH, film, kernel context, executor.
+// Everything one render holds in memory, put together in order: tables, BVH, film, kernel context,
+// executor.
 #pragma once
 
 #include <memory>
@@ -28,14 +29,16 @@ class Threads {
   tbb::task_arena arena_;
 };
 
-/// The kernels that the settings ask for. Throws Error(usage) if this machine or binary does not have them.
+/// The kernels that the settings ask for. Throws Error(usage) if this machine or binary does not
+/// have them.
 const stages::Kernels& KernelsFor(Isa isa);
 
 /// Reads the scene and what surrounds it. Call inside the arena.
 PreparedScene LoadScene(const RenderSettings& settings, const WarningSink& warn);
 
 /// What kernels are to read of `scene`; `trace` and `film` may be added later. Borrows all of it.
-stages::KernelContext MakeContext(const PreparedScene& scene, const Plan& plan, const RenderSettings& settings);
+stages::KernelContext MakeContext(const PreparedScene& scene, const Plan& plan,
+                                  const RenderSettings& settings);
 
 /// Owns what an executor borrows; not movable, since pointers into it are everywhere.
 class Workspace {

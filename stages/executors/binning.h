@@ -1,4 +1,5 @@
-// Which queue of the shading stage a hit belongs to: material x bounce depth, coarsened where bins could not fill.
+// Which queue of the shading stage a hit belongs to: material x bounce depth, coarsened where bins
+// could not fill.
 #pragma once
 
 #include <algorithm>
@@ -9,12 +10,14 @@
 
 namespace carpool::stages {
 
-/// Bins are worth having while each can hold a few full blocks of what is in flight; past that, depths are
-/// merged first (neighbouring depths run the same code on the same textures), then materials.
+/// Bins are worth having while each can hold a few full blocks of what is in flight; past that,
+/// depths are merged first (neighbouring depths run the same code on the same textures), then
+/// materials.
 class ShadeBins {
  public:
   ShadeBins(uint32_t materials, uint32_t max_depth, uint64_t in_flight, uint32_t block_items) {
-    const uint64_t room = std::max<uint64_t>(1, in_flight / (uint64_t{block_items} * kBlocksPerBin));
+    const uint64_t room =
+        std::max<uint64_t>(1, in_flight / (uint64_t{block_items} * kBlocksPerBin));
     materials_ = std::max<uint32_t>(1, materials);
     groups_ = static_cast<uint32_t>(std::min<uint64_t>(materials_, room));
     depths_ = static_cast<uint32_t>(
@@ -28,7 +31,8 @@ class ShadeBins {
     const uint32_t depth = std::min(flags & kPathDepthMask, depths_ - 1);
     const uint32_t group = groups_ == materials_
                                ? static_cast<uint32_t>(material)
-                               : static_cast<uint32_t>(uint64_t{static_cast<uint32_t>(material)} * groups_ / materials_);
+                               : static_cast<uint32_t>(uint64_t{static_cast<uint32_t>(material)} *
+                                                       groups_ / materials_);
     return group * depths_ + depth;
   }
 

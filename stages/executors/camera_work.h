@@ -1,4 +1,5 @@
-// Which camera packets a pass renders, in which order: tiles of 16x16 pixels, samples, groups of 4x2.
+// Which camera packets a pass renders, in which order: tiles of 16x16 pixels, samples, groups of
+// 4x2.
 #pragma once
 
 #include <algorithm>
@@ -13,21 +14,24 @@ constexpr uint32_t kGroupsPerTile = kTileSize * kTileSize / 8;
 constexpr uint32_t kPhases = 32;  // interleaved subsets of groups, for previews
 constexpr uint32_t kAllPhases = ~0u;
 
-/// Samples [first_sample, first_sample + sample_count) of the groups whose phase is in `phases` (bit p: phase p).
+/// Samples [first_sample, first_sample + sample_count) of the groups whose phase is in `phases`
+/// (bit p: phase p).
 struct CameraPass {
   uint32_t first_sample = 0;
   uint32_t sample_count = 1;
   uint32_t phases = kAllPhases;
 };
 
-/// A fixed group of 4x2 pixels at one sample: what one packet traces. Groups on the border may reach outside the image.
+/// A fixed group of 4x2 pixels at one sample: what one packet traces. Groups on the border may
+/// reach outside the image.
 struct CameraPacket {
   uint32_t x, y;  // of its first pixel
   uint32_t sample;
 };
 
-/// The phase of the group whose first pixel is (x, y), by its place among the 4 x 8 groups of its tile. The coordinates' bits are
-/// interleaved in reverse, so that the first 2^k phases are always an even grid.
+/// The phase of the group whose first pixel is (x, y), by its place among the 4 x 8 groups of its
+/// tile. The coordinates' bits are interleaved in reverse, so that the first 2^k phases are always
+/// an even grid.
 inline uint32_t PhaseOf(uint32_t x, uint32_t y) {
   const uint32_t column = x / kGroupWidth, row = y / kGroupHeight;
   return (row & 1) << 4 | (column & 1) << 3 | (row & 2) << 1 | (column & 2) | (row & 4) >> 2;
@@ -42,8 +46,8 @@ class CameraWork {
     end_ = tiles_x_ * tiles_y * pass.sample_count * kGroupsPerTile;
   }
 
-  /// Claims up to `count` places and calls `visit(packet)` for those inside the image and the phases.
-  /// False when nothing is left.
+  /// Claims up to `count` places and calls `visit(packet)` for those inside the image and the
+  /// phases. False when nothing is left.
   template <class Visit>
   bool Claim(uint32_t count, Visit visit) {
     const uint64_t first = next_.fetch_add(count, std::memory_order_relaxed);

@@ -18,7 +18,8 @@
 namespace carpool::stages {
 
 struct RayCounts {
-  uint64_t camera = 0, bounce = 0, shadow = 0;  // bounce counts continued rays through transparent layers too
+  uint64_t camera = 0, bounce = 0,
+           shadow = 0;  // bounce counts continued rays through transparent layers too
   uint64_t total() const { return camera + bounce + shadow; }
   RayCounts& operator+=(const RayCounts& other) {
     camera += other.camera;
@@ -40,13 +41,13 @@ struct ExecutorOptions {
 struct PassReport {
   RayCounts rays;
   double seconds = 0;
-  bool stopped = false;     // ended early: samples of some pixels of this pass are missing
-  RunReport schedule;       // of the stage graph; empty for executors without one
-  uint64_t state_bytes = 0; // path state
+  bool stopped = false;      // ended early: samples of some pixels of this pass are missing
+  RunReport schedule;        // of the stage graph; empty for executors without one
+  uint64_t state_bytes = 0;  // path state
 };
 
-/// Renders passes into the film of its context. The samples a pass adds, and their values, do not depend on
-/// executor, threads, batches or policy.
+/// Renders passes into the film of its context. The samples a pass adds, and their values, do not
+/// depend on executor, threads, batches or policy.
 class Executor {
  public:
   virtual ~Executor() = default;
@@ -55,8 +56,8 @@ class Executor {
   /// The stage graph in Graphviz's language; empty for executors without one.
   virtual std::string Dot() const = 0;
 
-  /// Renders one pass. `stop` ends it early: no new camera rays, what is in flight comes to its end.
-  /// `progress`, if set, is called now and then by some worker with the fraction done.
+  /// Renders one pass. `stop` ends it early: no new camera rays, what is in flight comes to its
+  /// end. `progress`, if set, is called now and then by some worker with the fraction done.
   virtual PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
                             const std::function<void(double)>& progress) = 0;
 };

@@ -1,4 +1,5 @@
-// The megakernel executor: one loop per path over tiles in parallel, from the same kernels at one lane.
+// The megakernel executor: one loop per path over tiles in parallel, from the same kernels at one
+// lane.
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -84,8 +85,8 @@ PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& s
   tbb::enumerable_thread_specific<RayCounts> tallies;
   std::atomic<bool> reporting{false};
 
-  // Each body keeps claiming the groups of one tile at one sample until none is left: dynamic balance, no
-  // barrier.
+  // Each body keeps claiming the groups of one tile at one sample until none is left: dynamic
+  // balance, no barrier.
   const auto worker = [&](size_t) {
     const FlushDenormals denormals;
     RayCounts& rays = tallies.local();

@@ -8,8 +8,8 @@
 
 namespace carpool::stages {
 
-/// Thread safe as long as each worker index is used by one thread at a time. Never runs dry while at most
-/// `in_flight` slots are taken at once: what workers may hoard is allocated on top.
+/// Thread safe as long as each worker index is used by one thread at a time. Never runs dry while
+/// at most `in_flight` slots are taken at once: what workers may hoard is allocated on top.
 class SlotPool {
  public:
   SlotPool(uint32_t in_flight, uint32_t workers)

@@ -1,4 +1,5 @@
-// The wavefront executor: the path tracer as a graph of stages, with queues binned by material and depth.
+// The wavefront executor: the path tracer as a graph of stages, with queues binned by material and
+// depth.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -25,8 +26,8 @@ uint32_t BlockItems(const ExecutorOptions& options, uint32_t preferred) {
   return options.batch_items != 0 ? std::min(options.batch_items, kMaxBatch) : preferred;
 }
 
-/// Paths in flight: enough to fill the bins, few enough for the cache and the memory asked for. A quarter of the
-/// budget is left to the queues.
+/// Paths in flight: enough to fill the bins, few enough for the cache and the memory asked for. A
+/// quarter of the budget is left to the queues.
 uint32_t PathsInFlight(const ExecutorOptions& options) {
   const uint64_t fitting = options.memory_bytes / 4 * 3 / sizeof(PathState);
   return static_cast<uint32_t>(std::clamp<uint64_t>(fitting, 1024, 65536));
@@ -39,7 +40,9 @@ std::vector<int32_t> Materials(std::span<const Placement> placements) {
 }
 
 uint32_t MaterialCount(const std::vector<int32_t>& materials) {
-  return materials.empty() ? 1 : static_cast<uint32_t>(*std::max_element(materials.begin(), materials.end())) + 1;
+  return materials.empty()
+             ? 1
+             : static_cast<uint32_t>(*std::max_element(materials.begin(), materials.end())) + 1;
 }
 
 class Wavefront final : public Executor {
@@ -52,7 +55,8 @@ class Wavefront final : public Executor {
         material_of_placement_(Materials(placements)),
         options_(options),
         in_flight_(PathsInFlight(options)),
-        bins_(MaterialCount(material_of_placement_), context.max_depth, in_flight_, BlockItems(options, 256)),
+        bins_(MaterialCount(material_of_placement_), context.max_depth, in_flight_,
+              BlockItems(options, 256)),
         pool_(in_flight_, options.threads),
         paths_(pool_.capacity()),
         tallies_(options.threads) {
@@ -106,16 +110,21 @@ class Wavefront final : public Executor {
   const std::atomic<bool>* stop_ = nullptr;
 };
 
-/// The lecture's loop as a graph: camera rays are traced, hits shaded, shadow rays traced, and what goes on
-/// is traced again, until the film has it.
+/// The lecture's loop as a graph: camera rays are traced, hits shaded, shadow rays traced, and what
+/// goes on is traced again, until the film has it.
 void Wavefront::BuildGraph() {
   has_environment_ = c_.lights.environment.width > 0;
   const uint32_t lanes = static_cast<uint32_t>(kernels_.lanes);
   const auto stage = [&](const char* name, uint32_t bins, uint32_t stage_lanes, int rank) {
-    return graph_.add_stage<Slot>({.name = name, .bins = bins, .block_items = BlockItems(options_, 256),
-                                   .lanes = stage_lanes, .rank = rank, .weight = 1});
+    return graph_.add_stage<Slot>({.name = name,
+                                   .bins = bins,
+                                   .block_items = BlockItems(options_, 256),
+                                   .lanes = stage_lanes,
+                                   .rank = rank,
+                                   .weight = 1});
   };
-  camera_ = graph_.add_stage<CameraPacket>({.name = "camera", .block_items = 32, .rank = 0, .weight = 8});
+  camera_ =
+      graph_.add_stage<CameraPacket>({.name = "camera", .block_items = 32, .rank = 0, .weight = 8});
   intersect_ = stage("intersect", 1, 1, 1);
   shade_ = stage("shade", bins_.count(), lanes, 2);
   shadow_ = stage("shadow", 1, 1, 3);
@@ -125,8 +134,10 @@ void Wavefront::BuildGraph() {
   const SourceHandle pixels = graph_.add_source(
       {.name = "pixels", .fan_out = 8, .concurrency = 0, .burst = 32},
       [this](SourceContext& source, Emitter& out) { return ClaimPackets(source, out); });
-  graph_.set_kernel(camera_, [this](const Batch<CameraPacket>& b, Emitter& out) { CameraKernel(b, out); });
-  graph_.set_kernel(intersect_, [this](const Batch<Slot>& b, Emitter& out) { IntersectKernel(b, out); });
+  graph_.set_kernel(camera_,
+                    [this](const Batch<CameraPacket>& b, Emitter& out) { CameraKernel(b, out); });
+  graph_.set_kernel(intersect_,
+                    [this](const Batch<Slot>& b, Emitter& out) { IntersectKernel(b, out); });
   graph_.set_kernel(shade_, [this](const Batch<Slot>& b, Emitter& out) { ShadeKernel(b, out); });
   graph_.set_kernel(shadow_, [this](const Batch<Slot>& b, Emitter& out) { ShadowKernel(b, out); });
   graph_.set_kernel(film_, [this](const Batch<Slot>& b, Emitter&) { FilmKernel(b); });
@@ -136,8 +147,10 @@ void Wavefront::BuildGraph() {
     graph_.add_edge(camera_, after_trace);
     graph_.add_edge(intersect_, after_trace);
   }
-  for (const StageHandle<Slot>& after_shade : {shadow_, intersect_, film_}) graph_.add_edge(shade_, after_shade);
-  for (const StageHandle<Slot>& after_shadow : {intersect_, film_}) graph_.add_edge(shadow_, after_shadow);
+  for (const StageHandle<Slot>& after_shade : {shadow_, intersect_, film_})
+    graph_.add_edge(shade_, after_shade);
+  for (const StageHandle<Slot>& after_shadow : {intersect_, film_})
+    graph_.add_edge(shadow_, after_shadow);
   if (has_environment_) {
     graph_.set_kernel(miss_, [this](const Batch<Slot>& b, Emitter& out) { MissKernel(b, out); });
     graph_.add_edge(camera_, miss_);
@@ -148,7 +161,8 @@ void Wavefront::BuildGraph() {
 
 SourceStatus Wavefront::ClaimPackets(SourceContext& source, Emitter& out) {
   if (stop_->load(std::memory_order_relaxed)) return SourceStatus::exhausted;
-  const bool more = work_->Claim(source.budget, [&](const CameraPacket& p) { out.emit(camera_, 0, p); });
+  const bool more =
+      work_->Claim(source.budget, [&](const CameraPacket& p) { out.emit(camera_, 0, p); });
   return more ? SourceStatus::more : SourceStatus::exhausted;
 }
 
@@ -198,8 +212,9 @@ void Wavefront::ShadeKernel(const Batch<Slot>& batch, Emitter& out) {
   next.resize(batch.items.size());
   kernels_.shade(c_, paths_.data(), batch.items, next.data());
   for (size_t i = 0; i < batch.items.size(); ++i) {
-    const StageHandle<Slot>& to =
-        next[i] == Next::shadow ? shadow_ : next[i] == Next::trace ? intersect_ : film_;
+    const StageHandle<Slot>& to = next[i] == Next::shadow  ? shadow_
+                                  : next[i] == Next::trace ? intersect_
+                                                           : film_;
     out.emit(to, 0, batch.items[i]);
   }
 }

@@ -13,7 +13,9 @@ T FetchAdd(T& cell, T value) {
   return std::atomic_ref<T>(cell).fetch_add(value, std::memory_order_relaxed);
 }
 
-int64_t ToFixed(double value) { return std::llrint(value * (1 / kFilmQuantum)); }
+int64_t ToFixed(double value) {
+  return std::llrint(value * (1 / kFilmQuantum));
+}
 
 void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
   const uint64_t bits = static_cast<uint64_t>(value);
@@ -22,8 +24,8 @@ void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
   high = static_cast<int16_t>(high + (low < old ? 1 : 0) + (value < 0 ? -1 : 0));
 }
 
-// The top bit of a pixel's sample count is its lock: one atomic exchange instead of four atomic sums. Two
-// threads meet on one pixel almost never, and then for a few nanoseconds.
+// The top bit of a pixel's sample count is its lock: one atomic exchange instead of four atomic
+// sums. Two threads meet on one pixel almost never, and then for a few nanoseconds.
 constexpr uint32_t kLocked = 1u << 31;
 
 /// Returns the sample count.
@@ -99,8 +101,9 @@ double FilmAccumulator::Sum(uint32_t pixel, int scramble, int channel) const {
 namespace {
 void MeanOf(const std::vector<int64_t>& sums, uint32_t pixel, uint32_t samples, double out[3]) {
   for (int c = 0; c < 3; ++c) {
-    out[c] = samples == 0 ? 0
-                          : static_cast<double>(sums[size_t{pixel} * 3 + c]) * kFilmQuantum / samples;
+    out[c] = samples == 0
+                 ? 0
+                 : static_cast<double>(sums[size_t{pixel} * 3 + c]) * kFilmQuantum / samples;
   }
 }
 }  // namespace

@@ -9,9 +9,10 @@
 
 namespace carpool::stages {
 
-constexpr int kScrambles = 4;          // samples belong by index to four independent scrambles
+constexpr int kScrambles = 4;             // samples belong by index to four independent scrambles
 constexpr double kFilmQuantum = 0x1p-32;  // cd/m2 (or the file's unit) of the lowest bit
-constexpr double kFilmLargest = 0x1p31;   // a sample's channel above this is clamped and counted
+constexpr double kFilmLargest =
+    0x1p30;  // a sample's channel above this is clamped and counted: 2^62 quanta
 
 /// Per pixel and scramble, RGB sums in 80-bit fixed point: range +-2^47 at quantum 2^-32, hence no
 /// overflow while samples per scramble x mean < 2^47. 128 bytes.
@@ -52,8 +53,8 @@ class FilmAccumulator {
   const FilmPlanes& planes() const { return planes_; }
   uint64_t bytes() const;
 
-  /// Adds one sample of `pixel` (y * width + x). Non-finite channels count as 0, oversized ones as the
-  /// largest; either is counted in `rejected`.
+  /// Adds one sample of `pixel` (y * width + x). Non-finite channels count as 0, oversized ones as
+  /// the largest; either is counted in `rejected`.
   void Add(uint32_t pixel, uint32_t sample, const float radiance[3]);
   /// Asks for the pixel's cache lines ahead of Add.
   void Prefetch(uint32_t pixel) const {
@@ -70,7 +71,9 @@ class FilmAccumulator {
   double Sum(uint32_t pixel, int scramble, int channel) const;
   void Albedo(uint32_t pixel, double rgb[3]) const;  // mean over the samples
   void Normal(uint32_t pixel, double xyz[3]) const;
-  float Depth(uint32_t pixel) const { return depth_[pixel]; }  // metres; infinity where nothing was hit
+  float Depth(uint32_t pixel) const {
+    return depth_[pixel];
+  }  // metres; infinity where nothing was hit
   uint32_t Object(uint32_t pixel) const { return object_[pixel]; }
   uint32_t Material(uint32_t pixel) const { return material_[pixel]; }
 

@@ -1,4 +1,5 @@
-// Camera rays: filter importance sampling, perspective and orthographic projection, the initial ray cone.
+// Camera rays: filter importance sampling, perspective and orthographic projection, the initial ray
+// cone.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -19,15 +20,18 @@ namespace carpool::stages::HWY_NAMESPACE {
 
 /// Point of the image plane, in units of the camera's half extents, right and up.
 template <class D>
-HWY_INLINE Vec2<D> ImagePlanePoint(D d, const KernelContext& c, Uint<D> pixel, const Vec2<D>& offset) {
+HWY_INLINE Vec2<D> ImagePlanePoint(D d, const KernelContext& c, Uint<D> pixel,
+                                   const Vec2<D>& offset) {
   const IntTag<D> di;
-  // Exact for widths up to 65,536: pixel numbers are below 2^28 and the quotient is mended by one step.
+  // Exact for widths up to 65,536: pixel numbers are below 2^28 and the quotient is mended by one
+  // step.
   const Int<D> index = hn::BitCast(di, pixel);
   const Int<D> width = hn::Set(di, static_cast<int32_t>(c.width));
   const Real<D> guess = hn::ConvertTo(d, index) * Splat(d, 1.0 / c.width);
   Int<D> row = hn::ConvertTo(di, guess);
   row = hn::IfThenElse(hn::Gt(row * width, index), row - hn::Set(di, 1), row);
-  row = hn::IfThenElse(hn::Gt(index - row * width, width - hn::Set(di, 1)), row + hn::Set(di, 1), row);
+  row = hn::IfThenElse(hn::Gt(index - row * width, width - hn::Set(di, 1)), row + hn::Set(di, 1),
+                       row);
   const Int<D> column = index - row * width;
   const Real<D> half = Splat(d, 0.5);
   const Real<D> x = hn::ConvertTo(d, column) + half + offset.x;
@@ -46,9 +50,8 @@ HWY_INLINE void CameraLanes(D d, const KernelContext& c, const PathLanes<D>& p) 
   const Vec2<D> plane = ImagePlanePoint(d, c, pixel, SamplePixelFilter(d, u));
 
   const float* m = c.camera.world_from_camera;
-  const auto axis = [&](int column) HWY_ATTR {
-    return Splat3(d, m[column], m[4 + column], m[8 + column]);
-  };
+  const auto axis = [&](int column)
+                        HWY_ATTR { return Splat3(d, m[column], m[4 + column], m[8 + column]); };
   const Real<D> x = plane.x * Splat(d, c.camera.half_width);
   const Real<D> y = plane.y * Splat(d, c.camera.half_height);
   const double pixel_extent = 2.0 * c.camera.half_height / c.height;

@@ -1,4 +1,5 @@
-// Instantiates every kernel for each instruction set, at full width and at one lane, and lists the tables.
+// Instantiates every kernel for each instruction set, at full width and at one lane, and lists the
+// tables.
 #include "stages/kernels/kernels.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -51,7 +52,9 @@ KernelSet MakeSet() {
 
 }  // namespace
 
-Kernels MakeKernels(std::string_view isa) { return {isa, MakeSet<Wide>(), MakeSet<One>(), &OpacityAt}; }
+Kernels MakeKernels(std::string_view isa) {
+  return {isa, MakeSet<Wide>(), MakeSet<One>(), &OpacityAt};
+}
 
 }  // namespace carpool::stages::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -1,5 +1,5 @@
-// The stages' kernels as plain functions over slots of path state: one table per instruction set, each
-// function at full SIMD width and at one lane, from the same source.
+// The stages' kernels as plain functions over slots of path state: one table per instruction set,
+// each function at full SIMD width and at one lane, from the same source.
 #pragma once
 
 #include <cstdint>
@@ -43,9 +43,10 @@ struct KernelSet {
   int lanes = 1;
   /// Starts paths: pixel and sample are set in each slot, the rest is written.
   void (*camera)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots);
-  /// Shades surface hits: emission, next-event estimation, BSDF sampling, roulette; or passes through a
-  /// transparent layer. Writes the way of each slot to `next`.
-  void (*shade)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots, Next* next);
+  /// Shades surface hits: emission, next-event estimation, BSDF sampling, roulette; or passes
+  /// through a transparent layer. Writes the way of each slot to `next`.
+  void (*shade)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots,
+                Next* next);
   /// Adds the environment to paths that left the scene; they end.
   void (*miss)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots);
 };
@@ -59,7 +60,8 @@ struct Kernels {
   float (*opacity)(const void* context, int32_t placement, uint32_t primitive, float u, float v);
 };
 
-/// The instruction sets that this binary has and this machine can run, best first; never empty on x86-64 with SSE4.2.
+/// The instruction sets that this binary has and this machine can run, best first; never empty on
+/// x86-64 with SSE4.2.
 std::span<const Kernels> AvailableKernels();
 
 /// `isa` among AvailableKernels(), or the best for "auto"; null if it is not available.

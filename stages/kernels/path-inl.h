@@ -1,4 +1,5 @@
-// How kernels read and write path state: gathers by slot, and stores to the lanes that a mask names.
+// How kernels read and write path state: gathers by slot, and stores to the lanes that a mask
+// names.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -120,8 +121,8 @@ HWY_INLINE void StoreQuad(D d, const LaneList<D>& list, size_t offset, X x, Y y,
   }
 }
 
-/// Unit vector to 2 x 16 bit octahedral coordinates (Cigolle et al. 2014) and back. Selection of lights
-/// and its MIS counterpart both use the decoded one, so its rounding never biases.
+/// Unit vector to 2 x 16 bit octahedral coordinates (Cigolle et al. 2014) and back. Selection of
+/// lights and its MIS counterpart both use the decoded one, so its rounding never biases.
 template <class D>
 HWY_INLINE Uint<D> EncodeNormal(D d, const Vec3<D>& n) {
   const IntTag<D> di;
@@ -133,7 +134,8 @@ HWY_INLINE Uint<D> EncodeNormal(D d, const Vec3<D>& n) {
   const Real<D> y = hn::IfThenElse(lower, hn::CopySign(one - hn::Abs(px), py), py);
   const auto quantise = [&](Real<D> v) HWY_ATTR {
     const Real<D> scaled = hn::MulAdd(v, Splat(d, 32767), Splat(d, 32768));
-    return hn::BitCast(UintTag<D>(), hn::NearestInt(hn::Min(hn::Max(scaled, hn::Zero(d)), Splat(d, 65535))));
+    return hn::BitCast(UintTag<D>(),
+                       hn::NearestInt(hn::Min(hn::Max(scaled, hn::Zero(d)), Splat(d, 65535))));
   };
   (void)di;
   return hn::Or(quantise(x), hn::ShiftLeft<16>(quantise(y)));

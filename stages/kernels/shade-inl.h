@@ -1,4 +1,5 @@
-// Shading: one vertex of each path: transparency, emission, next-event estimation, BSDF sampling, roulette.
+// Shading: one vertex of each path: transparency, emission, next-event estimation, BSDF sampling,
+// roulette.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -29,8 +30,10 @@ HWY_INLINE Real<D> PowerHeuristic(D d, Real<D> own, Real<D> other) {
 
 template <class D>
 HWY_INLINE Mask<D> AtLeast(D d, Uint<D> depth, uint32_t least) {
-  const IntTag<D> di;  // depths are small, so the signed comparison, which every target has, is the same
-  return hn::RebindMask(d, hn::Gt(hn::BitCast(di, depth), hn::Set(di, static_cast<int32_t>(least) - 1)));
+  const IntTag<D>
+      di;  // depths are small, so the signed comparison, which every target has, is the same
+  return hn::RebindMask(
+      d, hn::Gt(hn::BitCast(di, depth), hn::Set(di, static_cast<int32_t>(least) - 1)));
 }
 
 /// One vertex of the paths in flight, as the steps below hand it on.
@@ -38,33 +41,34 @@ template <class D>
 struct Vertex {
   PathLanes<D> path;
   Int<D> primitive;
-  Uint<D> depth;            // scattering events before this one
-  Uint<D> number;           // of the vertex in the table of sample dimensions: the camera is 0
+  Uint<D> depth;   // scattering events before this one
+  Uint<D> number;  // of the vertex in the table of sample dimensions: the camera is 0
   Uint<D> flags;
   SampleKey<D> key;
   SurfacePoint<D> at;
   Surface<D> surface;
   TextureFootprint<D> footprint;
-  Real<D> cone_width;       // of the ray cone, here ...
-  Real<D> cone_spread;      // ... and its growth per metre on the way
-  Vec3<D> toward;           // to the previous vertex
+  Real<D> cone_width;   // of the ray cone, here ...
+  Real<D> cone_spread;  // ... and its growth per metre on the way
+  Vec3<D> toward;       // to the previous vertex
   Vec3<D> ray_origin;
   Real<D> ray_pdf;
   Real<D> distance;
   Vec3<D> throughput;
-  Vec3<D> radiance;         // of the path so far, updated by the steps
+  Vec3<D> radiance;  // of the path so far, updated by the steps
 };
 
 template <class D>
 HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>& p) {
   const UintTag<D> du;
   const IntTag<D> di;
-  const Quad<D> origin = PathQuad(d, p, offsetof(PathState, origin));        // and tnear
-  const Quad<D> ray = PathQuad(d, p, offsetof(PathState, direction));        // and pdf
-  const Quad<D> through = PathQuad(d, p, offsetof(PathState, throughput));   // and cone_width
-  const Quad<D> gathered = PathQuad(d, p, offsetof(PathState, radiance));    // and cone_spread
-  const Quad<D> names = PathQuad(d, p, offsetof(PathState, pixel));          // pixel, sample, flags, placement
-  const Quad<D> hit = PathQuad(d, p, offsetof(PathState, primitive));        // primitive, u, v, distance
+  const Quad<D> origin = PathQuad(d, p, offsetof(PathState, origin));       // and tnear
+  const Quad<D> ray = PathQuad(d, p, offsetof(PathState, direction));       // and pdf
+  const Quad<D> through = PathQuad(d, p, offsetof(PathState, throughput));  // and cone_width
+  const Quad<D> gathered = PathQuad(d, p, offsetof(PathState, radiance));   // and cone_spread
+  const Quad<D> names =
+      PathQuad(d, p, offsetof(PathState, pixel));  // pixel, sample, flags, placement
+  const Quad<D> hit = PathQuad(d, p, offsetof(PathState, primitive));  // primitive, u, v, distance
   Vertex<D> v;
   v.path = p;
   v.flags = hn::BitCast(du, names.z);
@@ -86,21 +90,23 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
 
   v.cone_width = hn::MulAdd(v.cone_spread, v.distance, through.w);
   v.footprint.uv = TextureCoordinates(d, c, v.at, hn::Zero(IntTag<D>()));
-  // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter takes
-  // care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and blur).
+  // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter
+  // takes care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and
+  // blur).
   const Real<D> density = SafeDiv(d, TwiceTextureArea(d, c, v.at), v.surface.twice_area);
   v.footprint.log2_width = RoughLog2(d, v.cone_width) + RoughLog2(d, density) * Splat(d, 0.5);
   v.footprint.u_level = HashUniform(d, v.key, v.number, Purpose::texture_level, hn::Zero(du));
   return v;
 }
 
-/// Lanes that go straight on: transparent by chance of their alpha, or seen from behind by the camera
-/// where the material is single-sided. (Later rays see both sides: a wall must not leak light.)
+/// Lanes that go straight on: transparent by chance of their alpha, or seen from behind by the
+/// camera where the material is single-sided. (Later rays see both sides: a wall must not leak
+/// light.)
 template <class D>
-HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha,
-                                 Mask<D> active) {
+HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha, Mask<D> active) {
   const UintTag<D> du;
-  const Uint<D> layers = hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
+  const Uint<D> layers =
+      hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
   const Real<D> u = HashUniform(d, v.key, v.number, Purpose::alpha, layers);
   const Mask<D> transparent = hn::Ge(u, Opacity(d, v.at, alpha));
   const Mask<D> camera_ray = hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(du)));
@@ -109,7 +115,8 @@ HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha,
   return hn::And(active, hn::Or(transparent, culled));
 }
 
-/// The same ray goes on from just behind the layer. Past the largest number of layers the path ends.
+/// The same ray goes on from just behind the layer. Past the largest number of layers the path
+/// ends.
 template <class D>
 HWY_INLINE void ContinueThrough(D d, const Vertex<D>& v, Mask<D> passes, Next* next) {
   const UintTag<D> du;
@@ -126,14 +133,15 @@ HWY_INLINE void ContinueThrough(D d, const Vertex<D>& v, Mask<D> passes, Next* n
 
 /// What the AOVs want of the first hit.
 template <class D>
-HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v, const Vec3<D>& albedo,
-                               const Vec3<D>& normal, Mask<D> active) {
+HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v,
+                               const Vec3<D>& albedo, const Vec3<D>& normal, Mask<D> active) {
   const Mask<D> first = hn::And(active, hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(UintTag<D>()))));
   if (hn::AllFalse(d, first)) return;
   const LaneList<D> list = ListLanes(d, v.path, first);
   constexpr size_t kLanes = LaneList<D>::kLanes;
   HWY_ALIGN float words[7][kLanes];
-  const Real<D> values[7] = {albedo.x, albedo.y, albedo.z, normal.x, normal.y, normal.z, v.distance};
+  const Real<D> values[7] = {albedo.x, albedo.y, albedo.z,  normal.x,
+                             normal.y, normal.z, v.distance};
   for (int i = 0; i < 7; ++i) hn::Store(values[i], d, words[i]);
   for (size_t i = 0; i < list.count; ++i) {
     const size_t lane = list.lane[i];
@@ -152,7 +160,8 @@ HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v, 
 /// Emission of the surface that was hit, weighted against light sampling from the previous vertex.
 template <class D>
 HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> active) {
-  const Mask<D> front = hn::Or(hn::Not(v.surface.back), MaterialHas(d, v.at.material, kMaterialDoubleSided));
+  const Mask<D> front =
+      hn::Or(hn::Not(v.surface.back), MaterialHas(d, v.at.material, kMaterialDoubleSided));
   active = hn::And(hn::And(active, front), MaterialHas(d, v.at.material, kMaterialEmissive));
   if (hn::AllFalse(d, active)) return;
 
@@ -167,8 +176,9 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> a
     const Vec3<D> normal =
         DecodeNormal(d, hn::BitCast(UintTag<D>(), PathInt(d, v.path, offsetof(PathState, normal))));
     const Triangle<D>& t = v.surface.triangle;
-    const Real<D> pdf = lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
-                                               t.p1, t.p2, Neg<D>(v.toward), v.distance);
+    const Real<D> pdf =
+        lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
+                                       t.p1, t.p2, Neg<D>(v.toward), v.distance);
     weight = hn::IfThenElse(sampled, PowerHeuristic(d, v.ray_pdf, pdf), weight);
   }
   const Vec3<D> added = Scale(Mul<D>(v.throughput, emitted), weight);
@@ -189,12 +199,13 @@ HWY_INLINE SurfaceParams<D> MaterialParams(D d, const KernelContext& c, const Ve
   params.ior = factor(offsetof(Material, ior));
   params.ior_zero = MaterialHas(d, v.at.material, kMaterialIorZero);
   params.specular = factor(offsetof(Material, specular)) * specular.a;
-  params.specular_color = Mul<D>(
-      FieldVec3(d, v.at.material, offsetof(Material, specular_color)), tint.rgb);
+  params.specular_color =
+      Mul<D>(FieldVec3(d, v.at.material, offsetof(Material, specular_color)), tint.rgb);
   return params;
 }
 
-/// Radiance that a sampled triangle light sends towards `wi`'s origin; other lights know theirs already.
+/// Radiance that a sampled triangle light sends towards `wi`'s origin; other lights know theirs
+/// already.
 template <class D>
 HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const lights::LightSample<D>& light,
                                    Mask<D> active) {
@@ -208,13 +219,16 @@ HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const lights::Li
   if (hn::AllFalse(d, triangle)) return light.radiance_or_irradiance;
 
   const auto field = [&](size_t offset) HWY_ATTR {
-    return hn::IfThenElseZero(hn::RebindMask(di, triangle), FieldInt(d, c.lights.lights, valid, offset));
+    return hn::IfThenElseZero(hn::RebindMask(di, triangle),
+                              FieldInt(d, c.lights.lights, valid, offset));
   };
-  const SurfacePoint<D> at = MakeSurfacePoint(d, c, field(offsetof(Light, placement)),
-                                              field(offsetof(Light, primitive)), light.b1, light.b2);
+  const SurfacePoint<D> at =
+      MakeSurfacePoint(d, c, field(offsetof(Light, placement)), field(offsetof(Light, primitive)),
+                       light.b1, light.b2);
   const Vec2<D> uv = TextureCoordinates(d, c, at, hn::Zero(di));
   const Vec3<D> emitted = EmittedRadiance(d, c, at, uv, triangle);
-  return Select<D>(triangle, Mul<D>(light.radiance_or_irradiance, emitted), light.radiance_or_irradiance);
+  return Select<D>(triangle, Mul<D>(light.radiance_or_irradiance, emitted),
+                   light.radiance_or_irradiance);
 }
 
 /// The next vertex's start and the shading frame here, shared by light and BSDF sampling.
@@ -223,7 +237,7 @@ struct Scatter {
   Vec3<D> origin;
   Uint<D> packed_normal;
   Frame<D> frame;
-  Vec3<D> wo;    // local
+  Vec3<D> wo;  // local
   Bsdf<D> bsdf;
 };
 
@@ -236,12 +250,13 @@ struct ShadowRay {
 
 /// One light, one shadow ray.
 template <class D>
-HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& v, const Scatter<D>& s,
-                                  Mask<D> active) {
+HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& v,
+                                  const Scatter<D>& s, Mask<D> active) {
   const Real<D> u_pick = Sample1D(d, v.key, v.number, Purpose::light_pick);
   const Vec2<D> u_point = Sample2D(d, v.key, v.number, Purpose::light_point);
   const Vec3<D> normal = DecodeNormal(d, s.packed_normal);
-  const lights::LightSample<D> light = lights::SampleLight(d, c.lights, active, s.origin, normal, u_pick, u_point);
+  const lights::LightSample<D> light =
+      lights::SampleLight(d, c.lights, active, s.origin, normal, u_pick, u_point);
   const Real<D> zero = hn::Zero(d);
   Mask<D> wanted = hn::And(hn::And(active, hn::Gt(light.pdf, zero)),
                            hn::Gt(Dot(light.wi, v.surface.geometric), zero));
@@ -275,8 +290,8 @@ struct Bounce {
 
 /// BSDF sample and Russian roulette.
 template <class D>
-HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& v, const Scatter<D>& s,
-                                  Mask<D> active) {
+HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& v,
+                                  const Scatter<D>& s, Mask<D> active) {
   const Real<D> u_lobe = Sample1D(d, v.key, v.number, Purpose::lobe);
   const Vec2<D> u = Sample2D(d, v.key, v.number, Purpose::bsdf);
   const BsdfSample<D> sample = SampleBsdf(d, s.bsdf, s.wo, u_lobe, u);
@@ -294,14 +309,16 @@ HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& 
     const Real<D> u_roulette = Sample1D(d, v.key, v.number, Purpose::roulette);
     const Mask<D> dies = hn::And(roulette, hn::Ge(u_roulette, survival));
     b.alive = hn::AndNot(dies, b.alive);
-    b.throughput = Select<D>(roulette, Scale(b.throughput, SafeDiv(d, Splat(d, 1), survival)), b.throughput);
+    b.throughput =
+        Select<D>(roulette, Scale(b.throughput, SafeDiv(d, Splat(d, 1), survival)), b.throughput);
   }
   return b;
 }
 
 template <class D>
-HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s, const ShadowRay<D>& shadow,
-                            const Bounce<D>& bounce, Mask<D> lanes, Next* next) {
+HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s,
+                            const ShadowRay<D>& shadow, const Bounce<D>& bounce, Mask<D> lanes,
+                            Next* next) {
   const UintTag<D> du;
   const Real<D> zero = hn::Zero(d);
   const LaneList<D> list = ListLanes(d, v.path, lanes);
@@ -310,21 +327,26 @@ HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s, const 
     for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
     return;
   }
-  // Beyond a rough bounce the cone widens by roughly the lobe's width, whose solid angle is about 1 / pdf.
-  const Real<D> lobe = hn::Min(Splat(d, 0.25) / hn::Sqrt(hn::Max(bounce.pdf, Splat(d, 1e-6))), Splat(d, 0.5));
-  const Uint<D> flags = hn::Or(v.depth + hn::Set(du, 1),
-                               hn::IfThenElseZero(hn::RebindMask(du, bounce.alive), hn::Set(du, kPathAlive)));
+  // Beyond a rough bounce the cone widens by roughly the lobe's width, whose solid angle is about 1
+  // / pdf.
+  const Real<D> lobe =
+      hn::Min(Splat(d, 0.25) / hn::Sqrt(hn::Max(bounce.pdf, Splat(d, 1e-6))), Splat(d, 0.5));
+  const Uint<D> flags =
+      hn::Or(v.depth + hn::Set(du, 1),
+             hn::IfThenElseZero(hn::RebindMask(du, bounce.alive), hn::Set(du, kPathAlive)));
   const Real<D> shadow_distance = hn::IfThenElseZero(shadow.wanted, shadow.distance);
   StoreQuad(d, list, offsetof(PathState, origin), s.origin.x, s.origin.y, s.origin.z, zero);
-  StoreQuad(d, list, offsetof(PathState, direction), bounce.direction.x, bounce.direction.y, bounce.direction.z, bounce.pdf);
-  StoreQuad(d, list, offsetof(PathState, throughput), bounce.throughput.x, bounce.throughput.y, bounce.throughput.z,
-            v.cone_width);
-  StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z, v.cone_spread + lobe);
+  StoreQuad(d, list, offsetof(PathState, direction), bounce.direction.x, bounce.direction.y,
+            bounce.direction.z, bounce.pdf);
+  StoreQuad(d, list, offsetof(PathState, throughput), bounce.throughput.x, bounce.throughput.y,
+            bounce.throughput.z, v.cone_width);
+  StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
+            v.cone_spread + lobe);
   StoreWord(d, list, offsetof(PathState, flags), flags);
-  StoreQuad(d, list, offsetof(PathState, shadow_direction), shadow.direction.x, shadow.direction.y, shadow.direction.z,
-            shadow_distance);
-  StoreQuad(d, list, offsetof(PathState, shadow_radiance), shadow.radiance.x, shadow.radiance.y, shadow.radiance.z,
-            s.packed_normal);
+  StoreQuad(d, list, offsetof(PathState, shadow_direction), shadow.direction.x, shadow.direction.y,
+            shadow.direction.z, shadow_distance);
+  StoreQuad(d, list, offsetof(PathState, shadow_radiance), shadow.radiance.x, shadow.radiance.y,
+            shadow.radiance.z, s.packed_normal);
   for (size_t i = 0; i < list.count; ++i) {
     const PathState& path = *list.path[i];
     const bool alive = (path.flags & kPathAlive) != 0;
@@ -396,10 +418,11 @@ template <class D>
 HWY_INLINE Real<D> PointOpacity(D d, const KernelContext& c, int32_t placement, uint32_t primitive,
                                 float u, float v) {
   const IntTag<D> di;
-  const SurfacePoint<D> at = MakeSurfacePoint(d, c, hn::Set(di, placement),
-                                              hn::Set(di, static_cast<int32_t>(primitive)),
-                                              Splat(d, u), Splat(d, v));
-  const TextureFootprint<D> finest = {TextureCoordinates(d, c, at, hn::Zero(di)), Splat(d, -100), hn::Zero(d)};
+  const SurfacePoint<D> at =
+      MakeSurfacePoint(d, c, hn::Set(di, placement), hn::Set(di, static_cast<int32_t>(primitive)),
+                       Splat(d, u), Splat(d, v));
+  const TextureFootprint<D> finest = {TextureCoordinates(d, c, at, hn::Zero(di)), Splat(d, -100),
+                                      hn::Zero(d)};
   const Mask<D> all = hn::FirstN(d, hn::Lanes(d));
   return Opacity(d, at, BaseColor(d, c, at, finest, all).a);
 }

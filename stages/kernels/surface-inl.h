@@ -1,4 +1,5 @@
-// What a ray hit: position with its error bound, normals, texture coordinates and footprint, material values.
+// What a ray hit: position with its error bound, normals, texture coordinates and footprint,
+// material values.
 //
 // Per-target header: see stages/simd/lanes-inl.h.
 
@@ -32,19 +33,22 @@ HWY_INLINE SurfacePoint<D> MakeSurfacePoint(D d, const KernelContext& c, Int<D> 
   const Records<Placement, D> record = MakeRecords(d, c.geometry.placements, placement);
   return {record,
           MakeRecords(d, c.materials, FieldInt(d, record, offsetof(Placement, material))),
-          GatherTriangleIndices(d, c.geometry, record, primitive), b0, b1, b2};
+          GatherTriangleIndices(d, c.geometry, record, primitive),
+          b0,
+          b1,
+          b2};
 }
 
 /// The shape of the surface at a hit. Normals face the side that the ray came from.
 template <class D>
 struct Surface {
   Triangle<D> triangle;
-  Vec3<D> position;     // recomputed from barycentrics
-  Vec3<D> error;        // componentwise bound on its distance to the triangle that Embree sees
-  Vec3<D> geometric;    // unit normal of the triangle
-  Vec3<D> shading;      // interpolated, unit
+  Vec3<D> position;   // recomputed from barycentrics
+  Vec3<D> error;      // componentwise bound on its distance to the triangle that Embree sees
+  Vec3<D> geometric;  // unit normal of the triangle
+  Vec3<D> shading;    // interpolated, unit
   Real<D> twice_area;
-  Mask<D> back;         // the ray hit the side that glTF calls the back
+  Mask<D> back;  // the ray hit the side that glTF calls the back
 };
 
 /// Interpolates `size` <= 4 floats per vertex of one stream.
@@ -89,16 +93,16 @@ HWY_INLINE Mask<D> PlacementHas(D d, const Records<Placement, D>& placement, int
 
 template <class D>
 HWY_INLINE Vec3<D> MaxAbs3(const Triangle<D>& t) {
-  const auto most = [](Real<D> a, Real<D> b, Real<D> c) HWY_ATTR {
-    return hn::Max(hn::Abs(a), hn::Max(hn::Abs(b), hn::Abs(c)));
-  };
+  const auto most = [](Real<D> a, Real<D> b, Real<D> c)
+                        HWY_ATTR { return hn::Max(hn::Abs(a), hn::Max(hn::Abs(b), hn::Abs(c))); };
   return {most(t.p0.x, t.p1.x, t.p2.x), most(t.p0.y, t.p1.y, t.p2.y), most(t.p0.z, t.p1.z, t.p2.z)};
 }
 
 /// Bound on how far the recomputed position, and Embree's own idea of the plane, may be off. Flat
-/// triangles: interpolation errs by gamma(5) and the intersector's differences to the ray origin by a few
-/// more ulps of the largest vertex coordinate, not of the hit's (vertices may be far from it). Instanced ones
-/// add the transforms of vertices, origin and direction, relative to |M||p| + |t|.
+/// triangles: interpolation errs by gamma(5) and the intersector's differences to the ray origin by
+/// a few more ulps of the largest vertex coordinate, not of the hit's (vertices may be far from
+/// it). Instanced ones add the transforms of vertices, origin and direction, relative to |M||p| +
+/// |t|.
 template <class D>
 HWY_INLINE Vec3<D> PositionError(D d, const Records<Placement, D>& placement, Mask<D> instanced,
                                  const Triangle<D>& t) {
@@ -156,7 +160,8 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
 
 /// Texture coordinates of one set; (0, 0) where the shape has no such set.
 template <class D>
-HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const SurfacePoint<D>& at, Int<D> set) {
+HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const SurfacePoint<D>& at,
+                                      Int<D> set) {
   const IntTag<D> di;
   const Int<D> zero = hn::Zero(di);
   const Int<D> uvs = FieldInt(d, at.placement, offsetof(Placement, uvs));
@@ -165,13 +170,13 @@ HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const Surface
   if (hn::AllFalse(d, present)) return {hn::Zero(d), hn::Zero(d)};
   const auto vertex = [&](Int<D> i, int component) HWY_ATTR {
     const Int<D> word = uvs + (i * sets + set) * hn::Set(di, 2) + hn::Set(di, component);
-    return GatherReal(d, c.geometry.floats, hn::IfThenElse(hn::RebindMask(di, present), word, zero));
+    return GatherReal(d, c.geometry.floats,
+                      hn::IfThenElse(hn::RebindMask(di, present), word, zero));
   };
   const auto mix = [&](int component) HWY_ATTR {
-    const Real<D> value =
-        hn::MulAdd(at.b0, vertex(at.index.i0, component),
-                   hn::MulAdd(at.b1, vertex(at.index.i1, component),
-                              at.b2 * vertex(at.index.i2, component)));
+    const Real<D> value = hn::MulAdd(
+        at.b0, vertex(at.index.i0, component),
+        hn::MulAdd(at.b1, vertex(at.index.i1, component), at.b2 * vertex(at.index.i2, component)));
     return hn::IfThenElseZero(present, value);
   };
   return {mix(0), mix(1)};
@@ -205,9 +210,9 @@ HWY_INLINE Real<D> RoughLog2(D d, Real<D> x) {
 /// Where textures are read: coordinates of the first set and what the ray cone covers there.
 template <class D>
 struct TextureFootprint {
-  Vec2<D> uv;            // of set 0
-  Real<D> log2_width;    // of the cone, in texture coordinates; very negative: finest level
-  Real<D> u_level;       // chooses between neighbouring mip levels
+  Vec2<D> uv;          // of set 0
+  Real<D> log2_width;  // of the cone, in texture coordinates; very negative: finest level
+  Real<D> u_level;     // chooses between neighbouring mip levels
 };
 
 /// Reads one texture slot of each lane's material; `absent` where the material has none.
@@ -218,14 +223,15 @@ HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const SurfacePoi
   const IntTag<D> di;
   const Real<D> fill = Splat(d, absent);
   const Rgba<D> none = {{fill, fill, fill}, fill};
-  const Int<D> slot = FieldInt(d, at.material,
-                               offsetof(Material, slots) + 4 * static_cast<size_t>(which));
+  const Int<D> slot =
+      FieldInt(d, at.material, offsetof(Material, slots) + 4 * static_cast<size_t>(which));
   active = hn::And(active, IsPresent(d, slot));
   if (hn::AllFalse(d, active)) return none;
 
   const Int<D> valid = hn::IfThenElseZero(hn::RebindMask(di, active), slot);
-  const Int<D> set = hn::IfThenElseZero(hn::RebindMask(di, active),
-                                        FieldInt(d, c.textures.slots, valid, offsetof(TextureSlot, uv_set)));
+  const Int<D> set =
+      hn::IfThenElseZero(hn::RebindMask(di, active),
+                         FieldInt(d, c.textures.slots, valid, offsetof(TextureSlot, uv_set)));
   Vec2<D> uv = footprint.uv;
   const Mask<D> other_set = hn::RebindMask(d, hn::Gt(set, hn::Zero(di)));
   if (!hn::AllFalse(d, other_set)) {
@@ -272,11 +278,12 @@ HWY_INLINE Real<D> Opacity(D d, const SurfacePoint<D>& at, Real<D> alpha) {
   const Real<D> cutoff = FieldReal(d, at.material, offsetof(Material, alpha_cutoff));
   const Real<D> step = hn::IfThenElseZero(hn::Ge(alpha, cutoff), one);
   const Real<D> clamped = hn::Min(hn::Max(alpha, hn::Zero(d)), one);
-  return hn::IfThenElse(is(AlphaMode::mask), step, hn::IfThenElse(is(AlphaMode::blend), clamped, one));
+  return hn::IfThenElse(is(AlphaMode::mask), step,
+                        hn::IfThenElse(is(AlphaMode::blend), clamped, one));
 }
 
-/// Emitted radiance at a point, always from the finest mip level: seen directly, reached by BSDF sampling
-/// and by light sampling it is the same function, as MIS needs.
+/// Emitted radiance at a point, always from the finest mip level: seen directly, reached by BSDF
+/// sampling and by light sampling it is the same function, as MIS needs.
 template <class D>
 HWY_INLINE Vec3<D> EmittedRadiance(D d, const KernelContext& c, const SurfacePoint<D>& at,
                                    const Vec2<D>& uv, Mask<D> active) {
@@ -294,11 +301,12 @@ HWY_INLINE Mask<D> MaterialHas(D d, const Records<Material, D>& material, int32_
 /// The shading normal bent by the normal map, still facing the viewer's side of the triangle.
 template <class D>
 HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<D>& at,
-                                const Surface<D>& s, const TextureFootprint<D>& footprint, Mask<D> active) {
+                                const Surface<D>& s, const TextureFootprint<D>& footprint,
+                                Mask<D> active) {
   const IntTag<D> di;
   const Int<D> tangents = FieldInt(d, at.placement, offsetof(Placement, tangents));
-  const Int<D> slot = FieldInt(d, at.material,
-                               offsetof(Material, slots) + 4 * static_cast<size_t>(Slot::normal));
+  const Int<D> slot =
+      FieldInt(d, at.material, offsetof(Material, slots) + 4 * static_cast<size_t>(Slot::normal));
   active = hn::And(active, hn::And(IsPresent(d, tangents), IsPresent(d, slot)));
   if (hn::AllFalse(d, active)) return s.shading;
 
@@ -312,14 +320,16 @@ HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<
   Vec3<D> tangent = {Interpolate(d, c.geometry.floats, at, base, 4, 0),
                      Interpolate(d, c.geometry.floats, at, base, 4, 1),
                      Interpolate(d, c.geometry.floats, at, base, 4, 2)};
-  Real<D> handedness = GatherReal(d, c.geometry.floats, base + at.index.i0 * hn::Set(di, 4) + hn::Set(di, 3));
+  Real<D> handedness =
+      GatherReal(d, c.geometry.floats, base + at.index.i0 * hn::Set(di, 4) + hn::Set(di, 3));
   const Mask<D> instanced = PlacementHas(d, at.placement, kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
     tangent = Select<D>(instanced, VectorToWorld(d, at.placement, tangent), tangent);
     const Mask<D> mirrored = PlacementHas(d, at.placement, kPlacementMirrored);
     handedness = hn::IfThenElse(mirrored, hn::Neg(handedness), handedness);
   }
-  // The map is given for the front; its frame stays that of the front when seen from behind, then flips.
+  // The map is given for the front; its frame stays that of the front when seen from behind, then
+  // flips.
   const Vec3<D> normal = Select<D>(s.back, Neg<D>(s.shading), s.shading);
   const Vec3<D> bitangent = Scale(Cross<D>(normal, tangent), handedness);
   const Vec3<D> bent = MulAdd(tangent, x, MulAdd(bitangent, y, Scale(normal, z)));
@@ -327,7 +337,8 @@ HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<
   return Select<D>(active, Select<D>(s.back, Neg<D>(unit), unit), s.shading);
 }
 
-/// Turns a shading normal that faces away from the viewer just far enough back, so that every hit can be shaded.
+/// Turns a shading normal that faces away from the viewer just far enough back, so that every hit
+/// can be shaded.
 template <class D>
 HWY_INLINE Vec3<D> FaceViewer(D d, const Vec3<D>& normal, const Vec3<D>& toward) {
   const Real<D> least = Splat(d, 1e-3);
@@ -343,8 +354,8 @@ HWY_INLINE Vec3<D> FaceViewer(D d, const Vec3<D>& normal, const Vec3<D>& toward)
 template <class D>
 HWY_INLINE Vec3<D> OffsetOrigin(D d, const Surface<D>& s) {
   const Vec3<D>& n = s.geometric;
-  const Real<D> distance = hn::MulAdd(hn::Abs(n.x), s.error.x,
-                                      hn::MulAdd(hn::Abs(n.y), s.error.y, hn::Abs(n.z) * s.error.z));
+  const Real<D> distance = hn::MulAdd(
+      hn::Abs(n.x), s.error.x, hn::MulAdd(hn::Abs(n.y), s.error.y, hn::Abs(n.z) * s.error.z));
   const auto moved = [&](Real<D> p, Real<D> axis) HWY_ATTR {
     const Real<D> offset = axis * distance;
     const Real<D> o = p + offset;

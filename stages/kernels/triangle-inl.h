@@ -36,8 +36,8 @@ HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& vie
                                                     const Records<Placement, D>& placement,
                                                     Int<D> primitive) {
   const IntTag<D> di;
-  const Int<D> first = FieldInt(d, placement, offsetof(Placement, first_index)) +
-                       primitive * hn::Set(di, 3);
+  const Int<D> first =
+      FieldInt(d, placement, offsetof(Placement, first_index)) + primitive * hn::Set(di, 3);
   return {GatherInt(d, view.indices, first), GatherInt(d, view.indices, first + hn::Set(di, 1)),
           GatherInt(d, view.indices, first + hn::Set(di, 2))};
 }

@@ -105,7 +105,8 @@ HWY_INLINE Real<D> MaxComponent(const Vec3<D>& a) {
 /// Rec.709 luminance of linear RGB.
 template <class D>
 HWY_INLINE Real<D> Luminance(D d, const Vec3<D>& c) {
-  return hn::MulAdd(c.x, Splat(d, 0.2126), hn::MulAdd(c.y, Splat(d, 0.7152), c.z * Splat(d, 0.0722)));
+  return hn::MulAdd(c.x, Splat(d, 0.2126),
+                    hn::MulAdd(c.y, Splat(d, 0.7152), c.z * Splat(d, 0.0722)));
 }
 
 /// sqrt of a number that rounding may have pushed below zero: negative and NaN give 0.
@@ -162,9 +163,9 @@ HWY_INLINE Vec3<D> ToWorld(const Frame<D>& f, const Vec3<D>& v) {
   return MulAdd(f.t, v.x, MulAdd(f.b, v.y, Scale(f.n, v.z)));
 }
 
-/// Table look-ups: `index` counts elements; every lane's index must be in range (mask with IfThenElse
-/// to 0 first). Use these, never hn::GatherIndex: below four lanes Highway's x86 gathers read all four
-/// lanes of the register, unused ones at garbage addresses.
+/// Table look-ups: `index` counts elements; every lane's index must be in range (mask with
+/// IfThenElse to 0 first). Use these, never hn::GatherIndex: below four lanes Highway's x86 gathers
+/// read all four lanes of the register, unused ones at garbage addresses.
 template <class D>
 HWY_INLINE Real<D> GatherReal(D d, const float* HWY_RESTRICT base, Int<D> index) {
   if constexpr (hn::MaxLanes(D()) == 1) {
@@ -204,7 +205,7 @@ HWY_INLINE Int<D> FieldInt(D d, const Record* HWY_RESTRICT base, Int<D> index, s
   const IntTag<D> di;
   return GatherInt(d, base,
                    index * hn::Set(di, static_cast<int32_t>(sizeof(Record) / 4)) +
-                        hn::Set(di, static_cast<int32_t>(offset / 4)));
+                       hn::Set(di, static_cast<int32_t>(offset / 4)));
 }
 template <class Record, class D>
 HWY_INLINE Vec3<D> FieldVec3(D d, const Record* HWY_RESTRICT base, Int<D> index, size_t offset) {
@@ -212,8 +213,9 @@ HWY_INLINE Vec3<D> FieldVec3(D d, const Record* HWY_RESTRICT base, Int<D> index,
           FieldReal(d, base, index, offset + 8)};
 }
 
-/// One record of a table per lane. Queues are binned by what paths read, so that mostly all lanes read the
-/// same record: then its fields are broadcast, which costs a load where a gather costs one per lane.
+/// One record of a table per lane. Queues are binned by what paths read, so that mostly all lanes
+/// read the same record: then its fields are broadcast, which costs a load where a gather costs one
+/// per lane.
 template <class Record, class D>
 struct Records {
   const Record* base;
@@ -235,20 +237,23 @@ HWY_INLINE Records<Record, D> MakeRecords(D d, const Record* base, Int<D> index)
 template <class Record, class D>
 HWY_INLINE Real<D> FieldReal(D d, const Records<Record, D>& records, size_t offset) {
   if (hn::MaxLanes(D()) == 1 || records.same != nullptr) {
-    return hn::Set(d, *reinterpret_cast<const float*>(reinterpret_cast<const char*>(records.same) + offset));
+    return hn::Set(
+        d, *reinterpret_cast<const float*>(reinterpret_cast<const char*>(records.same) + offset));
   }
   return FieldReal(d, records.base, records.index, offset);
 }
 template <class Record, class D>
 HWY_INLINE Int<D> FieldInt(D d, const Records<Record, D>& records, size_t offset) {
   if (hn::MaxLanes(D()) == 1 || records.same != nullptr) {
-    return hn::Set(IntTag<D>(), *reinterpret_cast<const int32_t*>(reinterpret_cast<const char*>(records.same) + offset));
+    return hn::Set(IntTag<D>(), *reinterpret_cast<const int32_t*>(
+                                    reinterpret_cast<const char*>(records.same) + offset));
   }
   return FieldInt(d, records.base, records.index, offset);
 }
 template <class Record, class D>
 HWY_INLINE Vec3<D> FieldVec3(D d, const Records<Record, D>& records, size_t offset) {
-  return {FieldReal(d, records, offset), FieldReal(d, records, offset + 4), FieldReal(d, records, offset + 8)};
+  return {FieldReal(d, records, offset), FieldReal(d, records, offset + 4),
+          FieldReal(d, records, offset + 8)};
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

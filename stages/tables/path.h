@@ -8,37 +8,40 @@ namespace carpool::stages {
 
 /// One path is in exactly one queue at a time, so its state has one owner at a time. 32 words.
 struct alignas(128) PathState {
-  // The ray to trace next; it starts at the previous vertex (moved off the surface by its error bound).
+  // The ray to trace next; it starts at the previous vertex (moved off the surface by its error
+  // bound).
   float origin[3];
   float tnear;         // 0, or just past the last transparent hit along this same ray
   float direction[3];  // unit length
   float pdf;           // solid-angle density that chose `direction`; 0: camera ray, no MIS partner
   float throughput[3];
-  float cone_width;    // ray cone at the origin (metres) and its growth per metre
-  float radiance[3];   // gathered so far
+  float cone_width;   // ray cone at the origin (metres) and its growth per metre
+  float radiance[3];  // gathered so far
   float cone_spread;
 
-  uint32_t pixel;      // y * width + x
+  uint32_t pixel;  // y * width + x
   uint32_t sample;
-  uint32_t flags;      // PathFlags and counters
-  int32_t placement;   // what the ray hit; kNone: it left the scene
+  uint32_t flags;     // PathFlags and counters
+  int32_t placement;  // what the ray hit; kNone: it left the scene
   uint32_t primitive;
-  float u, v;          // barycentrics of vertices 1 and 2
+  float u, v;  // barycentrics of vertices 1 and 2
   float distance;
 
-  // The one shadow ray of this vertex, from `origin`; its contribution is added if it is unoccluded.
+  // The one shadow ray of this vertex, from `origin`; its contribution is added if it is
+  // unoccluded.
   float shadow_direction[3];
   float shadow_distance;  // 0: none
   float shadow_radiance[3];
-  uint32_t normal;        // shading normal at `origin`, octahedral 2 x 16 bit: light selection needs it again for MIS
+  uint32_t normal;  // shading normal at `origin`, octahedral 2 x 16 bit: light selection needs it
+                    // again for MIS
 };
 static_assert(sizeof(PathState) == 128);
 
 enum PathFlags : uint32_t {
-  kPathDepthMask = 0x1ff,       // scattering events so far
-  kPathLayerShift = 9,          // transparent layers passed since the last scattering event
+  kPathDepthMask = 0x1ff,  // scattering events so far
+  kPathLayerShift = 9,     // transparent layers passed since the last scattering event
   kPathLayerMask = 0x7ffu << 9,
-  kPathAlive = 1u << 20,        // goes on after its shadow ray
+  kPathAlive = 1u << 20,  // goes on after its shadow ray
 };
 
 constexpr uint32_t kLargestDepth = 256;

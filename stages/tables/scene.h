@@ -1,4 +1,5 @@
-// Everything the kernels may read of a scene, as plain tables; filled by render/, immutable while rendering.
+// Everything the kernels may read of a scene, as plain tables; filled by render/, immutable while
+// rendering.
 #pragma once
 
 #include <array>

@@ -8,26 +8,27 @@
 
 namespace carpool::stages {
 
-/// One Embree scene and the way from its hits to placements: a hit on a flat geometry g is placement
-/// `top[g]`; a hit on geometry g of instance i is placement `nested[top[i] + g]`.
+/// One Embree scene and the way from its hits to placements: a hit on a flat geometry g is
+/// placement `top[g]`; a hit on geometry g of instance i is placement `nested[top[i] + g]`.
 struct TraceLevel {
   RTCScene scene = nullptr;  // null: empty
   const int32_t* top = nullptr;
   const int32_t* nested = nullptr;
 };
 
-/// Opaque triangles and those whose material may let rays through live apart, so that shadow rays ask
-/// one yes-or-no question for nearly everything, and no texture is read inside a traversal.
+/// Opaque triangles and those whose material may let rays through live apart, so that shadow rays
+/// ask one yes-or-no question for nearly everything, and no texture is read inside a traversal.
 struct TraceView {
   TraceLevel opaque;
   TraceLevel transparent;
 };
 
-/// What stands at (placement, primitive, u, v) lets `1 - opacity` of a shadow ray through. Called only for
-/// hits in `TraceView::transparent`.
+/// What stands at (placement, primitive, u, v) lets `1 - opacity` of a shadow ray through. Called
+/// only for hits in `TraceView::transparent`.
 struct OpacityQuery {
   const void* context = nullptr;
-  float (*opacity)(const void* context, int32_t placement, uint32_t primitive, float u, float v) = nullptr;
+  float (*opacity)(const void* context, int32_t placement, uint32_t primitive, float u,
+                   float v) = nullptr;
 };
 
 /// Finds the nearest hit of the path's ray and writes placement, primitive, u, v and distance.
@@ -35,10 +36,12 @@ struct OpacityQuery {
 void IntersectPath(const TraceView& view, PathState& path);
 
 /// Eight camera rays of a fixed 4x2 pixel group, as one coherent packet. Null entries are skipped.
-/// Within a packet, mates can change each other's hits in the last bit; groups are therefore the same in every executor.
+/// Within a packet, mates can change each other's hits in the last bit; groups are therefore the
+/// same in every executor.
 void IntersectPacket(const TraceView& view, PathState* const paths[8]);
 
-/// Traces the path's shadow ray and adds its contribution, times what transparent layers let through.
+/// Traces the path's shadow ray and adds its contribution, times what transparent layers let
+/// through.
 void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& path);
 
 }  // namespace carpool::stages

@@ -40,7 +40,8 @@ TEST(CameraWork, CoversEveryGroupOfEverySampleOnce) {
 TEST(CameraWork, PhasesPartitionThePass) {
   std::map<Key, int> all;
   for (uint32_t phase = 0; phase < kPhases; ++phase) {
-    const auto visits = Visits(64, 64, {.first_sample = 0, .sample_count = 1, .phases = 1u << phase}, 16);
+    const auto visits =
+        Visits(64, 64, {.first_sample = 0, .sample_count = 1, .phases = 1u << phase}, 16);
     EXPECT_EQ(visits.size(), 16u * 32 / kPhases);
     for (const auto& [key, count] : visits) all[key] += count;
   }
@@ -52,21 +53,24 @@ TEST(SlotPool, NeverHandsOutASlotTwiceAndNeverRunsDry) {
   constexpr uint32_t kInFlight = 3000, kWorkers = 4;
   SlotPool pool(kInFlight, kWorkers);
   std::vector<std::atomic<int>> taken(pool.capacity());
-  tbb::parallel_for(uint32_t{0}, kWorkers, [&](uint32_t worker) {
-    std::vector<uint32_t> mine;
-    for (int round = 0; round < 200; ++round) {
-      while (mine.size() < kInFlight / kWorkers) {
-        mine.push_back(pool.Take(worker));
-        ASSERT_LT(mine.back(), pool.capacity());
-        EXPECT_EQ(taken[mine.back()].fetch_add(1), 0);
-      }
-      const size_t keep = static_cast<size_t>(round * 37) % mine.size();
-      const std::vector<uint32_t> back(mine.begin() + static_cast<ptrdiff_t>(keep), mine.end());
-      for (const uint32_t slot : back) taken[slot].fetch_sub(1);
-      mine.resize(keep);
-      pool.Give(worker, back);
-    }
-  }, tbb::simple_partitioner());
+  tbb::parallel_for(
+      uint32_t{0}, kWorkers,
+      [&](uint32_t worker) {
+        std::vector<uint32_t> mine;
+        for (int round = 0; round < 200; ++round) {
+          while (mine.size() < kInFlight / kWorkers) {
+            mine.push_back(pool.Take(worker));
+            ASSERT_LT(mine.back(), pool.capacity());
+            EXPECT_EQ(taken[mine.back()].fetch_add(1), 0);
+          }
+          const size_t keep = static_cast<size_t>(round * 37) % mine.size();
+          const std::vector<uint32_t> back(mine.begin() + static_cast<ptrdiff_t>(keep), mine.end());
+          for (const uint32_t slot : back) taken[slot].fetch_sub(1);
+          mine.resize(keep);
+          pool.Give(worker, back);
+        }
+      },
+      tbb::simple_partitioner());
 }
 
 TEST(ShadeBins, KeepsMaterialsApartWhileTheyCanBeFilled) {

@@ -1,4 +1,5 @@
-// The film: exact sums in any order, stated range and quantum, rejected samples counted, errors that are calibrated.
+// The film: exact sums in any order, stated range and quantum, rejected samples counted, errors
+// that are calibrated.
 #include "stages/film/accumulator.h"
 
 #include <gtest/gtest.h>
@@ -36,7 +37,8 @@ TEST(Film, SumsDoNotDependOnOrder) {
   for (const uint32_t i : order) AddGrey(forwards, 0, i, samples[i]);
   std::shuffle(order.begin(), order.end(), std::mt19937(2));
   for (const uint32_t i : order) AddGrey(shuffled, 0, i, samples[i]);
-  tbb::parallel_for(size_t{0}, order.size(), [&](size_t i) { AddGrey(threaded, 0, order[i], samples[order[i]]); });
+  tbb::parallel_for(size_t{0}, order.size(),
+                    [&](size_t i) { AddGrey(threaded, 0, order[i], samples[order[i]]); });
   for (int g = 0; g < kScrambles; ++g) {
     EXPECT_EQ(forwards.Sum(0, g, 1), shuffled.Sum(0, g, 1));
     EXPECT_EQ(forwards.Sum(0, g, 1), threaded.Sum(0, g, 1));
@@ -50,8 +52,9 @@ TEST(Film, SamplesGoToTheirScramble) {
   for (int g = 0; g < kScrambles; ++g) EXPECT_EQ(film.Sum(0, g, 0), (1 << g) + (1 << (g + 4)));
 }
 
-/// HARD_CASES row 42: at mean 1000 and standard deviation 1 the mean of a sum that has gone far past 2^64 quanta is exact to
-/// 1e-6. The 2^30 samples are stood in for by adding values 2^20 times as large 2^10 times.
+/// HARD_CASES row 42: at mean 1000 and standard deviation 1 the mean of a sum that has gone far
+/// past 2^64 quanta is exact to 1e-6. The 2^30 samples are stood in for by adding values 2^20 times
+/// as large 2^10 times.
 TEST(Film, SumsCarryBeyond64Bits) {
   FilmAccumulator film(1, 1, {});
   std::mt19937 random(3);
@@ -92,10 +95,13 @@ TEST(Film, RejectsAndCountsWhatIsNotANumberOrTooLarge) {
   EXPECT_EQ(film.Samples(0), 1u);
 }
 
-TEST(Film, TakesAtMost128BytesPerPixel) { EXPECT_LE(FilmAccumulator(10, 10, {}).bytes(), 128u * 100); }
+TEST(Film, TakesAtMost128BytesPerPixel) {
+  EXPECT_LE(FilmAccumulator(10, 10, {}).bytes(), 128u * 100);
+}
 
 TEST(Film, IdsAndDepthComeFromSampleZero) {
-  FilmAccumulator film(1, 1, {.albedo = true, .normal = true, .depth = true, .object = true, .material = true});
+  FilmAccumulator film(
+      1, 1, {.albedo = true, .normal = true, .depth = true, .object = true, .material = true});
   for (const uint32_t sample : {3u, 0u, 1u, 2u}) {
     const auto f = static_cast<float>(sample);
     film.AddFirstHit(0, sample, {{f, f, f}, {0, 0, 1}, 10 + f, 100 + sample, 200 + sample});
@@ -109,9 +115,10 @@ TEST(Film, IdsAndDepthComeFromSampleZero) {
   EXPECT_NEAR(albedo[0], 1.5, 1e-9);
 }
 
-/// The stated standard error is the spread of means over seeds: 64 x 64 pixels of exponential noise, whose mean of 64
-/// samples has the standard error 1/8. The pooled estimate has 64 x 3 degrees of freedom a tile, over 64 tiles: its mean
-/// is within 1 % except once in 1e6 seeds; the seed is fixed.
+/// The stated standard error is the spread of means over seeds: 64 x 64 pixels of exponential
+/// noise, whose mean of 64 samples has the standard error 1/8. The pooled estimate has 64 x 3
+/// degrees of freedom a tile, over 64 tiles: its mean is within 1 % except once in 1e6 seeds; the
+/// seed is fixed.
 TEST(Resolve, StandardErrorIsCalibrated) {
   constexpr uint32_t kSide = 64, kSamples = 64;
   FilmAccumulator film(kSide, kSide, {});

@@ -11,7 +11,8 @@ namespace carpool::test {
 namespace {
 
 std::string Base64(const std::vector<unsigned char>& bytes) {
-  static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  static constexpr char kDigits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   for (size_t i = 0; i < bytes.size(); i += 3) {
     const size_t left = std::min<size_t>(3, bytes.size() - i);
@@ -39,7 +40,8 @@ int SceneBuilder::AddMaterial(const nlohmann::json& material) {
   if (material.contains("extensions")) {
     for (const auto& [name, value] : material["extensions"].items()) {
       nlohmann::json& used = json_["extensionsUsed"];
-      if (used.is_null() || std::find(used.begin(), used.end(), name) == used.end()) used.push_back(name);
+      if (used.is_null() || std::find(used.begin(), used.end(), name) == used.end())
+        used.push_back(name);
     }
   }
   json_["materials"].push_back(material);
@@ -47,12 +49,14 @@ int SceneBuilder::AddMaterial(const nlohmann::json& material) {
 }
 
 int SceneBuilder::AddLambert(const Point& albedo, const Point& emission, double strength) {
-  nlohmann::json material = {
-      {"pbrMetallicRoughness",
-       {{"baseColorFactor", {albedo[0], albedo[1], albedo[2], 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}},
-      {"emissiveFactor", emission},
-      {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0}}}}}};
-  if (strength != 1) material["extensions"]["KHR_materials_emissive_strength"] = {{"emissiveStrength", strength}};
+  nlohmann::json material = {{"pbrMetallicRoughness",
+                              {{"baseColorFactor", {albedo[0], albedo[1], albedo[2], 1}},
+                               {"metallicFactor", 0},
+                               {"roughnessFactor", 1}}},
+                             {"emissiveFactor", emission},
+                             {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0}}}}}};
+  if (strength != 1)
+    material["extensions"]["KHR_materials_emissive_strength"] = {{"emissiveStrength", strength}};
   return AddMaterial(material);
 }
 
@@ -95,11 +99,14 @@ int SceneBuilder::AddIndices(const std::vector<uint32_t>& indices) {
   return static_cast<int>(json_["accessors"].size()) - 1;
 }
 
-int SceneBuilder::AddMesh(const std::vector<Point>& positions, const std::vector<uint32_t>& indices, int material,
-                          const std::vector<std::array<double, 2>>& uvs) {
+int SceneBuilder::AddMesh(const std::vector<Point>& positions, const std::vector<uint32_t>& indices,
+                          int material, const std::vector<std::array<double, 2>>& uvs) {
   std::vector<float> xyz, uv;
-  for (const Point& p : positions) xyz.insert(xyz.end(), {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
-  for (const auto& t : uvs) uv.insert(uv.end(), {static_cast<float>(t[0]), static_cast<float>(t[1])});
+  for (const Point& p : positions)
+    xyz.insert(xyz.end(),
+               {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
+  for (const auto& t : uvs)
+    uv.insert(uv.end(), {static_cast<float>(t[0]), static_cast<float>(t[1])});
   nlohmann::json primitive = {{"attributes", {{"POSITION", AddAccessor(xyz, 3)}}},
                               {"indices", AddIndices(indices)},
                               {"material", material}};
@@ -108,7 +115,8 @@ int SceneBuilder::AddMesh(const std::vector<Point>& positions, const std::vector
   return static_cast<int>(json_["meshes"].size()) - 1;
 }
 
-int SceneBuilder::AddQuad(const Point& a, const Point& b, const Point& c, const Point& d, int material) {
+int SceneBuilder::AddQuad(const Point& a, const Point& b, const Point& c, const Point& d,
+                          int material) {
   return AddMesh({a, b, c, d}, {0, 1, 2, 0, 2, 3}, material, {{0, 1}, {1, 1}, {1, 0}, {0, 0}});
 }
 
@@ -126,7 +134,8 @@ int SceneBuilder::AddBox(double half, int material, bool inwards) {
         points.push_back(p);
       }
       const bool flip = (side < 0) != inwards;  // counter-clockwise from +axis otherwise
-      for (const uint32_t k : flip ? std::array{0u, 2u, 1u, 0u, 3u, 2u} : std::array{0u, 1u, 2u, 0u, 2u, 3u}) {
+      for (const uint32_t k :
+           flip ? std::array{0u, 2u, 1u, 0u, 3u, 2u} : std::array{0u, 1u, 2u, 0u, 2u, 3u}) {
         indices.push_back(first + k);
       }
     }
@@ -148,8 +157,11 @@ int SceneBuilder::AddSphere(double radius, int rings, int material, bool inwards
   }
   for (int r = 0; r < rings; ++r) {
     for (int s = 0; s < segments; ++s) {
-      const auto at = [&](int row, int column) { return static_cast<uint32_t>(row * segments + column % segments); };
-      std::array<uint32_t, 6> quad = {at(r, s), at(r + 1, s), at(r + 1, s + 1), at(r, s), at(r + 1, s + 1), at(r, s + 1)};
+      const auto at = [&](int row, int column) {
+        return static_cast<uint32_t>(row * segments + column % segments);
+      };
+      std::array<uint32_t, 6> quad = {at(r, s), at(r + 1, s),     at(r + 1, s + 1),
+                                      at(r, s), at(r + 1, s + 1), at(r, s + 1)};
       if (inwards) {
         std::swap(quad[1], quad[2]);
         std::swap(quad[4], quad[5]);
@@ -173,11 +185,13 @@ int SceneBuilder::PlaceMesh(int mesh, const Point& translation) {
 }
 
 int SceneBuilder::AddCamera(const Point& eye, double yfov) {
-  json_["cameras"].push_back({{"type", "perspective"}, {"perspective", {{"yfov", yfov}, {"znear", 0.01}}}});
+  json_["cameras"].push_back(
+      {{"type", "perspective"}, {"perspective", {{"yfov", yfov}, {"znear", 0.01}}}});
   return AddNode({{"camera", json_["cameras"].size() - 1}, {"translation", eye}});
 }
 
-std::filesystem::path SceneBuilder::Write(const std::filesystem::path& folder, const std::string& name) const {
+std::filesystem::path SceneBuilder::Write(const std::filesystem::path& folder,
+                                          const std::string& name) const {
   nlohmann::json whole = json_;
   whole["buffers"] = {{{"byteLength", buffer_.size()},
                        {"uri", "data:application/octet-stream;base64," + Base64(buffer_)}}};
@@ -188,7 +202,8 @@ std::filesystem::path SceneBuilder::Write(const std::filesystem::path& folder, c
 
 ScratchFolder::ScratchFolder() {
   std::string pattern = (std::filesystem::temp_directory_path() / "carpool-test-XXXXXX").string();
-  if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("cannot make a temporary folder");
+  if (::mkdtemp(pattern.data()) == nullptr)
+    throw std::runtime_error("cannot make a temporary folder");
   path_ = pattern;
 }
 

@@ -1,4 +1,5 @@
-// Builds small glTF scenes in code, as text with the vertex data inside, for tests that need a known answer.
+// Builds small glTF scenes in code, as text with the vertex data inside, for tests that need a
+// known answer.
 #pragma once
 
 #include <array>
@@ -22,8 +23,8 @@ class SceneBuilder {
   int AddLambert(const Point& albedo, const Point& emission = {0, 0, 0}, double strength = 1);
 
   /// A mesh of triangles; `uvs` may be empty.
-  int AddMesh(const std::vector<Point>& positions, const std::vector<uint32_t>& indices, int material,
-              const std::vector<std::array<double, 2>>& uvs = {});
+  int AddMesh(const std::vector<Point>& positions, const std::vector<uint32_t>& indices,
+              int material, const std::vector<std::array<double, 2>>& uvs = {});
   /// A quadrilateral a, b, c, d, counter-clockwise as seen from its front.
   int AddQuad(const Point& a, const Point& b, const Point& c, const Point& d, int material);
   /// A closed box around the origin whose front faces look inwards (or outwards).
@@ -32,7 +33,7 @@ class SceneBuilder {
   int AddSphere(double radius, int rings, int material, bool inwards);
 
   int AddNode(const nlohmann::json& node);
-  int PlaceMesh(int mesh, const Point& translation = {0, 0, 0}) ;
+  int PlaceMesh(int mesh, const Point& translation = {0, 0, 0});
   /// A perspective camera at `eye`, looking along -Z.
   int AddCamera(const Point& eye, double yfov);
 

@@ -1,6 +1,7 @@
-// bench-render: the wavefront against the megakernel and against bare Embree, side by side in one run.
-#include <CLI/CLI.hpp>
+// bench-render: the wavefront against the megakernel and against bare Embree, side by side in one
+// run.
 #include <algorithm>
+#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
@@ -21,11 +22,13 @@ struct Options {
 };
 
 double Median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(values.size() / 2), values.end());
+  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(values.size() / 2),
+                   values.end());
   return values[values.size() / 2];
 }
 
-render::RenderSettings SettingsFor(const Options& o, const std::string& scene, render::Executor executor) {
+render::RenderSettings SettingsFor(const Options& o, const std::string& scene,
+                                   render::Executor executor) {
   render::RenderSettings s;
   s.scene_path = scene;
   s.env_path = o.environment;
@@ -55,10 +58,12 @@ void BenchScene(const Options& o, const std::string& scene, std::vector<Row>& ro
     const auto wave = load(render::Executor::wavefront), mega = load(render::Executor::megakernel);
     const std::atomic<bool> never{false};
     std::vector<double> ratios, wave_rays, mega_rays, replay_rays, shares;
-    const RayLog log = RecordRays(wave->context(), wave->kernels(), static_cast<uint32_t>(o.samples));
+    const RayLog log =
+        RecordRays(wave->context(), wave->kernels(), static_cast<uint32_t>(o.samples));
     stages::PassReport last;
     for (int round = 0; round < o.rounds + 1; ++round) {
-      const stages::CameraPass pass{.first_sample = 0, .sample_count = static_cast<uint32_t>(o.samples)};
+      const stages::CameraPass pass{.first_sample = 0,
+                                    .sample_count = static_cast<uint32_t>(o.samples)};
       const stages::PassReport m = mega->executor().Render(pass, never, {});
       const stages::PassReport w = wave->executor().Render(pass, never, {});
       const double plain = Replay(wave->context().trace, log, false, threads.arena());
@@ -72,14 +77,18 @@ void BenchScene(const Options& o, const std::string& scene, std::vector<Row>& ro
       last = w;
     }
     if (o.report) last.schedule.print(std::cout);
-    const double ratio = Median(ratios), of_embree = Median(wave_rays) / Median(replay_rays), share = Median(shares);
-    const double mebibytes = static_cast<double>(last.state_bytes + last.schedule.peak_bytes) / (1 << 20);
+    const double ratio = Median(ratios), of_embree = Median(wave_rays) / Median(replay_rays),
+                 share = Median(shares);
+    const double mebibytes =
+        static_cast<double>(last.state_bytes + last.schedule.peak_bytes) / (1 << 20);
     rows.push_back({name + ": wavefront over megakernel", ratio, "x", ">= 1", ratio >= 1});
     rows.push_back({name + ": wavefront", Median(wave_rays), "M rays/s", "", true});
     rows.push_back({name + ": megakernel", Median(mega_rays), "M rays/s", "", true});
     rows.push_back({name + ": bare Embree, same rays", Median(replay_rays), "M rays/s", "", true});
-    rows.push_back({name + ": wavefront over bare Embree", of_embree, "x", ">= 0.5", of_embree >= 0.5});
-    rows.push_back({name + ": megakernel over bare Embree", Median(mega_rays) / Median(replay_rays), "x", "", true});
+    rows.push_back(
+        {name + ": wavefront over bare Embree", of_embree, "x", ">= 0.5", of_embree >= 0.5});
+    rows.push_back({name + ": megakernel over bare Embree", Median(mega_rays) / Median(replay_rays),
+                    "x", "", true});
     rows.push_back({name + ": scheduler share of worker time", share, "%", "< 3", share < 3});
     rows.push_back({name + ": path state and queues", mebibytes, "MiB", "<= 64", mebibytes <= 64});
   });
@@ -87,7 +96,9 @@ void BenchScene(const Options& o, const std::string& scene, std::vector<Row>& ro
 
 int Main(int argc, char** argv) {
   Options o;
-  CLI::App app{"Renders scenes by wavefront and megakernel in turn and replays the same rays through bare Embree; medians."};
+  CLI::App app{
+      "Renders scenes by wavefront and megakernel in turn and replays the same rays through bare "
+      "Embree; medians."};
   app.add_option("scenes", o.scenes, "glTF files")->required();
   app.add_option("--env", o.environment, "environment map");
   app.add_option("--width", o.width, "pixels");
@@ -114,4 +125,6 @@ int Main(int argc, char** argv) {
 }  // namespace
 }  // namespace carpool::tools
 
-int main(int argc, char** argv) { return carpool::tools::Main(argc, argv); }
+int main(int argc, char** argv) {
+  return carpool::tools::Main(argc, argv);
+}

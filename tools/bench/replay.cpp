@@ -77,7 +77,10 @@ class Window {
   }
 
   static RecordedRay RayOf(const PathState& p, const float direction[3], float tnear, float tfar) {
-    return {{p.origin[0], p.origin[1], p.origin[2]}, {direction[0], direction[1], direction[2]}, tnear, tfar};
+    return {{p.origin[0], p.origin[1], p.origin[2]},
+            {direction[0], direction[1], direction[2]},
+            tnear,
+            tfar};
   }
 
   const KernelContext& c_;
@@ -108,7 +111,8 @@ void SortWindow(RecordedRay* first, size_t count) {
     uint64_t key = 0, octant = 0;
     for (int c = 0; c < 3; ++c) {
       const float extent = std::max(high[c] - low[c], 1e-20f);
-      const auto cell = static_cast<uint64_t>(std::min((first[i].origin[c] - low[c]) / extent * 1024.0f, 1023.0f));
+      const auto cell = static_cast<uint64_t>(
+          std::min((first[i].origin[c] - low[c]) / extent * 1024.0f, 1023.0f));
       key |= SpreadBits(cell) << c;
       octant |= (first[i].direction[c] < 0 ? 1u : 0u) << c;
     }
@@ -121,7 +125,18 @@ void SortWindow(RecordedRay* first, size_t count) {
 }
 
 void SetRay(RTCRay& ray, const RecordedRay& r) {
-  ray = {r.origin[0], r.origin[1], r.origin[2], r.tnear, r.direction[0], r.direction[1], r.direction[2], 0, r.tfar, ~0u, 0, 0};
+  ray = {r.origin[0],
+         r.origin[1],
+         r.origin[2],
+         r.tnear,
+         r.direction[0],
+         r.direction[1],
+         r.direction[2],
+         0,
+         r.tfar,
+         ~0u,
+         0,
+         0};
 }
 
 void ReplayBounce(const stages::TraceView& view, const RecordedRay& r) {
@@ -151,14 +166,16 @@ RayLog RecordRays(const KernelContext& context, const stages::Kernels& kernels, 
   const stages::FlushDenormals denormals;
   RayLog log;
   Window window(context, kernels, log);
-  stages::CameraWork work(context.width, context.height, {.first_sample = 0, .sample_count = samples});
+  stages::CameraWork work(context.width, context.height,
+                          {.first_sample = 0, .sample_count = samples});
   while (work.Claim(1024, [&](const stages::CameraPacket& packet) { window.Add(packet); })) {
   }
   window.Follow();
   return log;
 }
 
-double Replay(const stages::TraceView& view, const RayLog& log, bool sorted, tbb::task_arena& arena) {
+double Replay(const stages::TraceView& view, const RayLog& log, bool sorted,
+              tbb::task_arena& arena) {
   std::vector<RecordedRay> bounce = log.bounce, shadow = log.shadow;
   std::vector<PathState> camera = log.camera;
   const auto begin = std::chrono::steady_clock::now();
@@ -178,7 +195,10 @@ double Replay(const stages::TraceView& view, const RayLog& log, bool sorted, tbb
     });
     constexpr size_t kSortWindow = size_t{1} << 18;
     for (std::vector<RecordedRay>* rays : {&bounce, &shadow}) {
-      if (sorted) in_chunks(rays->size(), kSortWindow, [&](size_t first, size_t last) { SortWindow(rays->data() + first, last - first); });
+      if (sorted)
+        in_chunks(rays->size(), kSortWindow, [&](size_t first, size_t last) {
+          SortWindow(rays->data() + first, last - first);
+        });
     }
     in_chunks(bounce.size(), 512, [&](size_t first, size_t last) {
       for (size_t i = first; i < last; ++i) ReplayBounce(view, bounce[i]);

@@ -1,4 +1,5 @@
-// Records all rays of a render and replays them through bare Embree: the speed that no renderer can beat.
+// Records all rays of a render and replays them through bare Embree: the speed that no renderer can
+// beat.
 #pragma once
 
 #include <vector>
@@ -13,19 +14,23 @@ struct RecordedRay {
   float tnear, tfar;
 };
 
-/// Rays of one pass in the order of waves: all camera rays of a window of paths, their shadow rays, their bounces, and so on.
+/// Rays of one pass in the order of waves: all camera rays of a window of paths, their shadow rays,
+/// their bounces, and so on.
 struct RayLog {
-  std::vector<stages::PathState> camera;  // groups of 8 that are one packet; empty places have width 0 directions
+  std::vector<stages::PathState>
+      camera;  // groups of 8 that are one packet; empty places have width 0 directions
   std::vector<RecordedRay> bounce, shadow;
   uint64_t total() const { return camera.size() + bounce.size() + shadow.size(); }
 };
 
 /// Follows every path of samples [0, samples) with the kernels of `set`, on the calling thread.
-RayLog RecordRays(const stages::KernelContext& context, const stages::Kernels& kernels, uint32_t samples);
+RayLog RecordRays(const stages::KernelContext& context, const stages::Kernels& kernels,
+                  uint32_t samples);
 
-/// Seconds to replay on the threads of `arena`: camera rays as coherent packets, the others as single rays.
-/// With `sorted`, bounce and shadow rays are sorted first by direction octant and Morton code of the origin, in windows of
-/// 256k, and the sorting is counted.
-double Replay(const stages::TraceView& view, const RayLog& log, bool sorted, tbb::task_arena& arena);
+/// Seconds to replay on the threads of `arena`: camera rays as coherent packets, the others as
+/// single rays. With `sorted`, bounce and shadow rays are sorted first by direction octant and
+/// Morton code of the origin, in windows of 256k, and the sorting is counted.
+double Replay(const stages::TraceView& view, const RayLog& log, bool sorted,
+              tbb::task_arena& arena);
 
 }  // namespace carpool::tools

@@ -1,5 +1,6 @@
-// Rendered energy against closed forms: furnaces and form factors. Tolerances are 0.3 %; the noise of each
-// estimate, from the image's own standard error, is far below it, so that a false alarm is a matter of many sigmas.
+// Rendered energy against closed forms: furnaces and form factors. Tolerances are 0.3 %; the noise
+// of each estimate, from the image's own standard error, is far below it, so that a false alarm is
+// a matter of many sigmas.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +29,8 @@ class Energy : public testing::Test {
   ScratchFolder folder_;
 };
 
-/// Inside a closed Lambert box that glows: L = Le (1 - rho^(k+1)) / (1 - rho) at k scattering events.
+/// Inside a closed Lambert box that glows: L = Le (1 - rho^(k+1)) / (1 - rho) at k scattering
+/// events.
 TEST_F(Energy, ClosedFurnaceCutAtAnyDepth) {
   const double rho = 0.8, emission = 0.5;
   SceneBuilder b;
@@ -42,7 +44,8 @@ TEST_F(Energy, ClosedFurnaceCutAtAnyDepth) {
   }
 }
 
-/// A point straight below the middle of a 2 x 2 light at height 1 receives E = 0.55413 pi L (HARD_CASES row 26).
+/// A point straight below the middle of a 2 x 2 light at height 1 receives E = 0.55413 pi L
+/// (HARD_CASES row 26).
 TEST_F(Energy, QuadLightAtUnitHeight) {
   const double radiance = 2, rho = 0.5;
   SceneBuilder b;
@@ -51,8 +54,12 @@ TEST_F(Energy, QuadLightAtUnitHeight) {
   b.PlaceMesh(b.AddQuad({-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}, lamp));
   b.PlaceMesh(b.AddQuad({-5, 0, 5}, {5, 0, 5}, {5, 0, -5}, {-5, 0, -5}, floor));
   // Below the lamp, looking down at a patch so small that its irradiance is the centre's.
-  b.json()["cameras"] = {{{"type", "orthographic"}, {"orthographic", {{"xmag", 0.01}, {"ymag", 0.01}, {"znear", 0}, {"zfar", 10}}}}};
-  b.AddNode({{"camera", 0}, {"translation", {0, 0.5, 0}}, {"rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)}}});
+  b.json()["cameras"] = {
+      {{"type", "orthographic"},
+       {"orthographic", {{"xmag", 0.01}, {"ymag", 0.01}, {"znear", 0}, {"zfar", 10}}}}};
+  b.AddNode({{"camera", 0},
+             {"translation", {0, 0.5, 0}},
+             {"rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)}}});
   RenderSettings s = Settings(b, "quad");
   s.max_depth = 1;
   const double expected = rho / kPi * 0.55413 * kPi * radiance;
@@ -64,13 +71,17 @@ TEST_F(Energy, PunctualUnits) {
   const double rho = 0.6;
   for (const bool directional : {false, true}) {
     SceneBuilder b;
-    b.PlaceMesh(b.AddQuad({-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, b.AddLambert({rho, rho, rho})));
+    b.PlaceMesh(
+        b.AddQuad({-5, -5, 0}, {5, -5, 0}, {5, 5, 0}, {-5, 5, 0}, b.AddLambert({rho, rho, rho})));
     b.json()["extensionsUsed"].push_back("KHR_lights_punctual");
-    b.json()["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", directional ? "directional" : "point"}, {"intensity", 12}}};
-    b.AddNode({{"translation", {0, 0, 2}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+    b.json()["extensions"]["KHR_lights_punctual"]["lights"] = {
+        {{"type", directional ? "directional" : "point"}, {"intensity", 12}}};
+    b.AddNode(
+        {{"translation", {0, 0, 2}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
     b.AddCamera({0, 0, 1}, 0.01);
     const double irradiance = directional ? 12 : 12 / 4.0;
-    EXPECT_NEAR(MeanOf(RenderOnce(Settings(b, "punctual")).image, "G") / (rho * irradiance / kPi), 1, 0.003)
+    EXPECT_NEAR(MeanOf(RenderOnce(Settings(b, "punctual")).image, "G") / (rho * irradiance / kPi),
+                1, 0.003)
         << (directional ? "directional" : "point");
   }
 }
@@ -81,7 +92,9 @@ TEST_F(Energy, WhiteSpheresUnderAWhiteSky) {
     for (const double roughness : {0.0, 0.3, 0.7, 1.0}) {
       SceneBuilder b;
       const int white = b.AddMaterial({{"pbrMetallicRoughness",
-                                        {{"baseColorFactor", {1, 1, 1, 1}}, {"metallicFactor", metallic}, {"roughnessFactor", roughness}}}});
+                                        {{"baseColorFactor", {1, 1, 1, 1}},
+                                         {"metallicFactor", metallic},
+                                         {"roughnessFactor", roughness}}}});
       b.PlaceMesh(b.AddSphere(1, 64, white, false));
       b.AddCamera({0, 0, 4}, 0.3);
       RenderSettings s = Settings(b, "sphere");
@@ -90,7 +103,8 @@ TEST_F(Energy, WhiteSpheresUnderAWhiteSky) {
                                            << std::string("\x80\x80\x80\x81", 4);
       s.env_path = sky.string();
       s.max_depth = 32;
-      EXPECT_NEAR(MeanOf(RenderOnce(s).image, "G"), 1, 0.003) << "metallic " << metallic << ", roughness " << roughness;
+      EXPECT_NEAR(MeanOf(RenderOnce(s).image, "G"), 1, 0.003)
+          << "metallic " << metallic << ", roughness " << roughness;
     }
   }
 }

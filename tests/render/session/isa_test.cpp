@@ -1,4 +1,5 @@
-// Every instruction set of this machine renders the same picture, up to noise: Welch's t-test on image means.
+// Every instruction set of this machine renders the same picture, up to noise: Welch's t-test on
+// image means.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -33,9 +34,12 @@ TEST(InstructionSets, AgreeStatistically) {
   const ScratchFolder folder;
   SceneBuilder b;
   const int lamp = b.AddLambert({0, 0, 0}, {1, 1, 1}, 5);
-  const int gold = b.AddMaterial({{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0.7, 0.3, 1}}, {"roughnessFactor", 0.4}}}});
+  const int gold =
+      b.AddMaterial({{"pbrMetallicRoughness",
+                      {{"baseColorFactor", {1, 0.7, 0.3, 1}}, {"roughnessFactor", 0.4}}}});
   b.PlaceMesh(b.AddBox(2, b.AddLambert({0.6, 0.5, 0.7}), true));
-  b.PlaceMesh(b.AddQuad({-0.5, 1.9, -0.5}, {0.5, 1.9, -0.5}, {0.5, 1.9, 0.5}, {-0.5, 1.9, 0.5}, lamp));
+  b.PlaceMesh(
+      b.AddQuad({-0.5, 1.9, -0.5}, {0.5, 1.9, -0.5}, {0.5, 1.9, 0.5}, {-0.5, 1.9, 0.5}, lamp));
   b.PlaceMesh(b.AddSphere(0.6, 16, gold, false));
   b.AddCamera({0, 0, 1.8}, 1);
   render::RenderSettings settings;

@@ -1,5 +1,5 @@
-// Every model of the shared glTF set renders under both executors, to the same bytes and without a NaN, or is
-// refused for the right reason.
+// Every model of the shared glTF set renders under both executors, to the same bytes and without a
+// NaN, or is refused for the right reason.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +11,9 @@
 namespace carpool::test {
 namespace {
 
-std::filesystem::path SharedModels() { return std::filesystem::path(CARPOOL_SOURCE_DIR) / ".." / "shared" / "gltf"; }
+std::filesystem::path SharedModels() {
+  return std::filesystem::path(CARPOOL_SOURCE_DIR) / ".." / "shared" / "gltf";
+}
 
 std::vector<std::filesystem::path> ModelFiles() {
   std::set<std::filesystem::path> files;
@@ -32,9 +34,10 @@ bool AllFinite(const render::ExrImage& image) {
   return true;
 }
 
-/// Models, by folder, that require an extension which is not there yet; each must be refused by its name.
-const std::map<std::string, std::string> kRefused = {{"BoxDraco", "KHR_draco_mesh_compression"},
-                                                     {"ClearCoatCarPaint", "KHR_materials_clearcoat"}};
+/// Models, by folder, that require an extension which is not there yet; each must be refused by its
+/// name.
+const std::map<std::string, std::string> kRefused = {
+    {"BoxDraco", "KHR_draco_mesh_compression"}, {"ClearCoatCarPaint", "KHR_materials_clearcoat"}};
 
 void ExpectRefusal(const render::RenderSettings& settings, const std::string& extension) {
   try {
@@ -47,14 +50,16 @@ void ExpectRefusal(const render::RenderSettings& settings, const std::string& ex
 }
 
 TEST(Models, RenderTheSameUnderBothExecutors) {
-  if (!std::filesystem::exists(SharedModels())) GTEST_SKIP() << "the shared glTF models are not beside this checkout";
+  if (!std::filesystem::exists(SharedModels()))
+    GTEST_SKIP() << "the shared glTF models are not beside this checkout";
   for (const std::filesystem::path& file : ModelFiles()) {
     SCOPED_TRACE(file.filename().string());
     render::RenderSettings settings;
     settings.scene_path = file.string();
     settings.width = settings.height = 256;
     settings.samples = 16;
-    if (const auto refused = kRefused.find(file.parent_path().filename().string()); refused != kRefused.end()) {
+    if (const auto refused = kRefused.find(file.parent_path().filename().string());
+        refused != kRefused.end()) {
       ExpectRefusal(settings, refused->second);
       continue;
     }

@@ -29,9 +29,12 @@ inline std::string PixelBytes(const render::ExrImage& image) {
   std::string bytes;
   for (const render::ExrChannel& channel : image.channels) {
     bytes += channel.name + ":";
-    std::visit([&](const auto& plane) {
-      bytes.append(reinterpret_cast<const char*>(plane.data()), plane.size() * sizeof(plane[0]));
-    }, channel.plane);
+    std::visit(
+        [&](const auto& plane) {
+          bytes.append(reinterpret_cast<const char*>(plane.data()),
+                       plane.size() * sizeof(plane[0]));
+        },
+        channel.plane);
   }
   return bytes;
 }
