@@ -11,16 +11,15 @@ readonly carpool_packages=(
   'libtbb-dev          header:tbb/task_arena.h'
   'libembree-dev       header:embree4/rtcore.h,embree3/rtcore.h'
   'libopenexr-dev      header:OpenEXR/ImfMultiPartOutputFile.h'
-  'libtinygltf-dev     header:tiny_gltf.h'
   'libhwy-dev          header:hwy/highway.h'
   'libcli11-dev        header:CLI/CLI.hpp'
   'libgtest-dev        header:gtest/gtest.h'
   'libgmock-dev        header:gmock/gmock.h'
   'libbenchmark-dev    header:benchmark/benchmark.h'
   'libpng-dev          header:png.h'
+  'zlib1g-dev          header:zlib.h'
   'libturbojpeg0-dev   header:turbojpeg.h'
   'nlohmann-json3-dev  header:nlohmann/json.hpp'
-  'libstb-dev          header:stb/stb_image_write.h'
 )
 
 # Prints the folders where headers may be, one per line. No compiler is asked: there may be none yet.
