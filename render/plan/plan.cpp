@@ -95,8 +95,7 @@ void PlanLights(Plan& plan, const PreparedScene& scene) {
 void PlanStages(Plan& plan, const PreparedScene& scene, const std::vector<Material>& used,
                 const RenderSettings& settings) {
   const stages::LightTables& lights = scene.tables.lights;
-  const bool any_light = lights.tree_probability > 0 || lights.infinite_probability > 0 ||
-                         lights.environment_probability > 0;
+  const bool any_light = stages::HasLights(stages::LightViewOf(scene.tables));
   const auto add = [&](const char* name, bool present, std::string why) {
     plan.parts.push_back({"stage", name, present, std::move(why)});
   };

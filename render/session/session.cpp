@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstdio>
 
 #include "render/film/resolve.h"
 #include "render/image/atomic_file.h"

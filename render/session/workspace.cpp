@@ -98,7 +98,6 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
   options.memory_bytes = MemoryBytes(settings, threads.count());
   options.batch_items = static_cast<uint32_t>(settings.batch_items);
   options.policy = SchedulerPolicy(settings.policy);
-  executor_reason_ = plan_.executor_reason;
   executor_ =
       plan_.executor == Executor::megakernel
           ? stages::MakeMegakernel(context_, kernels_, options)

@@ -53,7 +53,6 @@ class Workspace {
   const stages::KernelContext& context() const { return context_; }
   const stages::FilmAccumulator& film() const { return film_; }
   stages::Executor& executor() { return *executor_; }
-  const std::string& executor_reason() const { return executor_reason_; }
   const Bvh& bvh() const { return bvh_; }
 
  private:
@@ -63,7 +62,6 @@ class Workspace {
   Bvh bvh_;
   stages::FilmAccumulator film_;
   stages::KernelContext context_;
-  std::string executor_reason_;
   std::unique_ptr<stages::Executor> executor_;
 };
 

@@ -2,7 +2,6 @@
 // depth.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <vector>
 
 #include "stages/executors/binning.h"
@@ -99,7 +98,7 @@ class Wavefront final : public Executor {
   SlotPool pool_;
   std::vector<PathState> paths_;
   std::vector<WorkerTally> tallies_;
-  bool has_environment_ = false;
+  bool has_environment_ = false, has_shadow_ = false;
 
   Graph graph_;
   StageHandle<CameraPacket> camera_;
@@ -114,6 +113,7 @@ class Wavefront final : public Executor {
 /// goes on is traced again, until the film has it.
 void Wavefront::BuildGraph() {
   has_environment_ = c_.lights.environment.width > 0;
+  has_shadow_ = HasLights(c_.lights) && c_.max_depth > 0;
   const uint32_t lanes = static_cast<uint32_t>(kernels_.lanes);
   const auto stage = [&](const char* name, uint32_t bins, uint32_t stage_lanes, int rank) {
     return graph_.add_stage<Slot>({.name = name,
@@ -127,7 +127,7 @@ void Wavefront::BuildGraph() {
       graph_.add_stage<CameraPacket>({.name = "camera", .block_items = 32, .rank = 0, .weight = 8});
   intersect_ = stage("intersect", 1, 1, 1);
   shade_ = stage("shade", bins_.count(), lanes, 2);
-  shadow_ = stage("shadow", 1, 1, 3);
+  if (has_shadow_) shadow_ = stage("shadow", 1, 1, 3);
   film_ = stage("film", 1, 1, 5);
   if (has_environment_) miss_ = stage("environment", 1, lanes, 4);
 
@@ -139,7 +139,6 @@ void Wavefront::BuildGraph() {
   graph_.set_kernel(intersect_,
                     [this](const Batch<Slot>& b, Emitter& out) { IntersectKernel(b, out); });
   graph_.set_kernel(shade_, [this](const Batch<Slot>& b, Emitter& out) { ShadeKernel(b, out); });
-  graph_.set_kernel(shadow_, [this](const Batch<Slot>& b, Emitter& out) { ShadowKernel(b, out); });
   graph_.set_kernel(film_, [this](const Batch<Slot>& b, Emitter&) { FilmKernel(b); });
 
   graph_.add_edge(pixels, camera_);
@@ -147,10 +146,16 @@ void Wavefront::BuildGraph() {
     graph_.add_edge(camera_, after_trace);
     graph_.add_edge(intersect_, after_trace);
   }
-  for (const StageHandle<Slot>& after_shade : {shadow_, intersect_, film_})
+  for (const StageHandle<Slot>& after_shade : {intersect_, film_}) {
     graph_.add_edge(shade_, after_shade);
-  for (const StageHandle<Slot>& after_shadow : {intersect_, film_})
-    graph_.add_edge(shadow_, after_shadow);
+  }
+  if (has_shadow_) {
+    graph_.set_kernel(shadow_,
+                      [this](const Batch<Slot>& b, Emitter& out) { ShadowKernel(b, out); });
+    graph_.add_edge(shade_, shadow_);
+    graph_.add_edge(shadow_, intersect_);
+    graph_.add_edge(shadow_, film_);
+  }
   if (has_environment_) {
     graph_.set_kernel(miss_, [this](const Batch<Slot>& b, Emitter& out) { MissKernel(b, out); });
     graph_.add_edge(camera_, miss_);

@@ -3,15 +3,13 @@
 
 #include <atomic>
 #include <cstdint>
-#include <memory>
-#include <span>
 #include <vector>
 
 namespace carpool::stages {
 
 constexpr int kScrambles = 4;             // samples belong by index to four independent scrambles
 constexpr double kFilmQuantum = 0x1p-32;  // cd/m2 (or the file's unit) of the lowest bit
-constexpr double kFilmLargest = 0x1p30;  // larger channels are clamped and counted: 2^62 quanta
+constexpr double kFilmLargest = 0x1p30;   // larger channels are clamped and counted: 2^62 quanta
 
 /// Per pixel and scramble, RGB sums in 80-bit fixed point: range +-2^47 at quantum 2^-32, hence no
 /// overflow while samples per scramble x mean < 2^47. 128 bytes.

@@ -125,7 +125,6 @@ HWY_INLINE void StoreQuad(D d, const LaneList<D>& list, size_t offset, X x, Y y,
 /// lights and its MIS counterpart both use the decoded one, so its rounding never biases.
 template <class D>
 HWY_INLINE Uint<D> EncodeNormal(D d, const Vec3<D>& n) {
-  const IntTag<D> di;
   const Real<D> one = Splat(d, 1);
   const Real<D> inverse = one / (hn::Abs(n.x) + hn::Abs(n.y) + hn::Abs(n.z));
   const Real<D> px = n.x * inverse, py = n.y * inverse;
@@ -137,7 +136,6 @@ HWY_INLINE Uint<D> EncodeNormal(D d, const Vec3<D>& n) {
     return hn::BitCast(UintTag<D>(),
                        hn::NearestInt(hn::Min(hn::Max(scaled, hn::Zero(d)), Splat(d, 65535))));
   };
-  (void)di;
   return hn::Or(quantise(x), hn::ShiftLeft<16>(quantise(y)));
 }
 template <class D>

@@ -94,7 +94,9 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
   // takes care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and
   // blur).
   const Real<D> density = SafeDiv(d, TwiceTextureArea(d, c, v.at), v.surface.twice_area);
-  v.footprint.log2_width = RoughLog2(d, v.cone_width) + RoughLog2(d, density) * Splat(d, 0.5);
+  const Real<D> least = Splat(d, 1e-30);  // a camera inside a surface, a shape without coordinates
+  v.footprint.log2_width = hn::MulAdd(FastLog2(d, hn::Max(density, least)), Splat(d, 0.5),
+                                      FastLog2(d, hn::Max(v.cone_width, least)));
   v.footprint.u_level = HashUniform(d, v.key, v.number, Purpose::texture_level, hn::Zero(du));
   return v;
 }

@@ -200,13 +200,6 @@ HWY_INLINE Real<D> TwiceTextureArea(D d, const KernelContext& c, const SurfacePo
   return hn::IfThenElseZero(present, hn::Abs(DifferenceOfProducts(u1, v2, u2, v1)));
 }
 
-/// log2 with the mantissa taken as linear: within 0.09, which is plenty to choose a mip level.
-template <class D>
-HWY_INLINE Real<D> RoughLog2(D d, Real<D> x) {
-  const Real<D> bits = hn::ConvertTo(d, hn::BitCast(IntTag<D>(), hn::Max(x, Splat(d, 1e-30))));
-  return hn::MulAdd(bits, Splat(d, 0x1p-23), Splat(d, -127));
-}
-
 /// Where textures are read: coordinates of the first set and what the ray cone covers there.
 template <class D>
 struct TextureFootprint {

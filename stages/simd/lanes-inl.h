@@ -138,6 +138,22 @@ HWY_INLINE Vec3<D> Normalize(D d, const Vec3<D>& a) {
   return Scale(a, Splat(d, 1) / hn::Sqrt(Dot(a, a)));
 }
 
+/// log2 of a positive normal float, within 2e-5; exact for powers of two.
+template <class D>
+HWY_INLINE Real<D> FastLog2(D d, Real<D> x) {
+  const IntTag<D> di;
+  const Int<D> bits = hn::BitCast(di, x);
+  const Real<D> exponent = hn::ConvertTo(d, hn::ShiftRight<23>(bits) - hn::Set(di, 127));
+  const Int<D> mantissa = hn::Or(hn::And(bits, hn::Set(di, 0x7fffff)), hn::Set(di, 0x3f800000));
+  const Real<D> t = hn::BitCast(d, mantissa) - Splat(d, 1);
+  Real<D> q = Splat(d, 0.0451482938);  // t * q(t) ~ log2(1 + t), q(1) = 1
+  q = hn::MulAdd(q, t, Splat(d, -0.193573782));
+  q = hn::MulAdd(q, t, Splat(d, 0.41560437));
+  q = hn::MulAdd(q, t, Splat(d, -0.709095857));
+  q = hn::MulAdd(q, t, Splat(d, 1.441916975));
+  return hn::MulAdd(t, q, exponent);
+}
+
 /// Right-handed orthonormal basis around a unit vector (Duff et al. 2017, "Building an Orthonormal
 /// Basis, Revisited", listing 3): stable at z = -1 and -0.
 template <class D>

@@ -41,6 +41,12 @@ struct LightView {
   GeometryView geometry;  // where triangle lights find their vertices
 };
 
+/// Is there anything that next-event estimation could choose?
+inline bool HasLights(const LightView& view) {
+  return view.tree_probability > 0 || view.infinite_probability > 0 ||
+         view.environment_probability > 0;
+}
+
 inline LightView LightViewOf(const SceneTables& scene) {
   const LightTables& lights = scene.lights;
   LightView view;

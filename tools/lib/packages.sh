@@ -15,7 +15,6 @@ readonly carpool_packages=(
   'libcli11-dev        header:CLI/CLI.hpp'
   'libgtest-dev        header:gtest/gtest.h'
   'libgmock-dev        header:gmock/gmock.h'
-  'libbenchmark-dev    header:benchmark/benchmark.h'
   'libpng-dev          header:png.h'
   'zlib1g-dev          header:zlib.h'
   'libturbojpeg0-dev   header:turbojpeg.h'
