@@ -51,7 +51,7 @@ template <class DT>
 HWY_INLINE hn::Vec<DT> LookUp(DT dt, const hn::TFromD<DT>* HWY_RESTRICT table,
                               hn::Vec<hn::RebindToSigned<DT>> index) {
   if constexpr (hn::MaxLanes(DT()) == 1) {
-    return hn::Set(dt, table[hn::GetLane(index)]);
+    return hn::LoadU(dt, table + hn::GetLane(index));
   } else if constexpr (hn::MaxLanes(DT()) < 4) {
     int32_t lanes[4];
     hn::TFromD<DT> values[4];

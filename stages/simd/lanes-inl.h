@@ -32,9 +32,18 @@ using Uint = hn::Vec<UintTag<D>>;
 template <class D>
 using Mask = hn::Mask<D>;
 
+/// `value` in every lane. One lane is loaded, not broadcast: SSE4 would shuffle each constant.
+template <class D>
+HWY_INLINE hn::Vec<D> Broadcast(D d, hn::TFromD<D> value) {
+  if constexpr (hn::MaxLanes(D()) == 1) {
+    return hn::LoadU(d, &value);
+  } else {
+    return hn::Set(d, value);
+  }
+}
 template <class D>
 HWY_INLINE Real<D> Splat(D d, double value) {
-  return hn::Set(d, static_cast<hn::TFromD<D>>(value));
+  return Broadcast(d, static_cast<hn::TFromD<D>>(value));
 }
 
 /// Points, directions and RGB triples, one per lane.
@@ -185,7 +194,7 @@ HWY_INLINE Vec3<D> ToWorld(const Frame<D>& f, const Vec3<D>& v) {
 template <class D>
 HWY_INLINE Real<D> GatherReal(D d, const float* HWY_RESTRICT base, Int<D> index) {
   if constexpr (hn::MaxLanes(D()) == 1) {
-    return hn::Set(d, base[hn::GetLane(index)]);
+    return hn::LoadU(d, base + hn::GetLane(index));
   } else {
     return hn::GatherIndex(d, base, index);
   }
@@ -195,7 +204,7 @@ HWY_INLINE Int<D> GatherInt(D, const void* HWY_RESTRICT base, Int<D> index) {
   const IntTag<D> di;
   const int32_t* const words = static_cast<const int32_t*>(base);
   if constexpr (hn::MaxLanes(D()) == 1) {
-    return hn::Set(di, words[hn::GetLane(index)]);
+    return hn::LoadU(di, words + hn::GetLane(index));
   } else {
     return hn::GatherIndex(di, words, index);
   }
