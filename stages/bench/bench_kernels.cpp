@@ -17,8 +17,9 @@
 #define HWY_TARGET_INCLUDE "stages/bench/bench_kernels.cpp"
 #include "hwy/foreach_target.h"
 
-#include "stages/bench/plain_kernels-inl.h"
+#include "stages/bench/plain_texture-inl.h"
 #include "stages/kernels/bsdf-inl.h"
+#include "stages/kernels/texture-inl.h"
 #include "stages/sampling/sobol-inl.h"
 
 #ifndef CARPOOL_STAGES_BENCH_KERNELS_TYPES
@@ -31,7 +32,8 @@ constexpr size_t kItems = 4096;
 struct Work {
   std::vector<uint32_t> pixel, sample, vertex;
   std::vector<float> in[20];
-  std::vector<float> out[8];
+  std::vector<float> out[3];
+  TextureTables textures;
 };
 enum Column {
   kBase = 0,
@@ -43,8 +45,13 @@ enum Column {
   kWo = 10,
   kLobe = 13,
   kU = 14,
-  kWi = 16
+  kWi = 16,
+  kUv = 14,
+  kFootprint = 19
 };
+
+/// The slots of a textured metallic-roughness material: colour, metallic-roughness, normal.
+constexpr int kSlots = 3;
 
 /// One kernel, three ways, on one target.
 struct Contest {
@@ -146,11 +153,38 @@ void LaneBsdf(Work& w) {
   }
 }
 
+void PlainTexture(Work& w) {
+  const TextureTablesView view = ViewOf(w.textures);
+  for (size_t i = 0; i < kItems; ++i) {
+    for (int slot = 0; slot < kSlots; ++slot) {
+      const plain::Float4 c = plain::SampleTexture(view, slot, {w.in[kUv][i], w.in[kUv + 1][i]},
+                                                   w.in[kFootprint][i], w.in[kLobe][i]);
+      w.out[slot][i] = c.r + c.g + c.b + c.a;
+    }
+  }
+}
+
+template <class D>
+void LaneTexture(Work& w) {
+  const D d;
+  const TextureTablesView view = ViewOf(w.textures);
+  for (size_t i = 0; i < kItems; i += hn::Lanes(d)) {
+    const Vec2<D> uv{hn::LoadU(d, &w.in[kUv][i]), hn::LoadU(d, &w.in[kUv + 1][i])};
+    for (int slot = 0; slot < kSlots; ++slot) {
+      const Rgba<D> c =
+          SampleTexture(d, view, hn::Set(IntTag<D>(), slot), hn::FirstN(d, kItems), uv,
+                        hn::LoadU(d, &w.in[kFootprint][i]), hn::LoadU(d, &w.in[kLobe][i]));
+      hn::StoreU(SumComponents(c.rgb) + c.a, d, &w.out[slot][i]);
+    }
+  }
+}
+
 std::vector<bench::Contest> KernelContests() {
   using One = hn::CappedTag<float, 1>;
   using Wide = hn::ScalableTag<float>;
   return {{"sampler", PlainSampler, LaneSampler<One>, LaneSampler<Wide>},
-          {"bsdf", PlainBsdf, LaneBsdf<One>, LaneBsdf<Wide>}};
+          {"bsdf", PlainBsdf, LaneBsdf<One>, LaneBsdf<Wide>},
+          {"texture", PlainTexture, LaneTexture<One>, LaneTexture<Wide>}};
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE
@@ -162,9 +196,30 @@ HWY_EXPORT(KernelContests);
 namespace bench {
 namespace {
 
+/// Three images of 128x128 random texels with their mips, the first sRGB, read with the sampler of
+/// glTF's default.
+TextureTables MakeTextures(std::mt19937& random) {
+  TextureTables tables;
+  for (int slot = 0; slot < kSlots; ++slot) {
+    Texture image;
+    image.width = image.height = 128;
+    image.levels = 8;
+    image.srgb = slot == 0;
+    for (int level = 0; level < image.levels; ++level) {
+      image.level_offset[level] = static_cast<int32_t>(tables.words.size());
+      const size_t side = static_cast<size_t>(image.width) >> level;
+      for (size_t texel = 0; texel < side * side; ++texel) tables.words.push_back(random());
+    }
+    tables.textures.push_back(image);
+    tables.slots.push_back({.texture = slot});
+  }
+  return tables;
+}
+
 Work MakeWork() {
   Work w;
   std::mt19937 random(1);
+  w.textures = MakeTextures(random);
   const auto uniform = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
   for (auto& column : w.in) column.resize(kItems);
   for (auto& column : w.out) column.resize(kItems);
@@ -178,6 +233,7 @@ Work MakeWork() {
     for (int c = 0; c < 3; ++c) w.in[kSpecularColor + c][i] = 1;
     // As in scenes: half the surfaces are dielectric, most others metal.
     w.in[kMetallic][i] = i % 2 == 0 ? 0.0f : i % 8 == 1 ? 0.5f : 1.0f;
+    w.in[kFootprint][i] = -8 + 4 * w.in[kFootprint][i];  // levels 0 to 3
     for (const int column : {kWo, kWi}) {
       const float z = 0.02f + 0.98f * uniform(), sine = std::sqrt(1 - z * z),
                   angle = 6.2831853f * uniform();

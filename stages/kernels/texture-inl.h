@@ -99,7 +99,7 @@ HWY_INLINE auto Choose(D, Mask<D> condition, const Yes& yes, const No& no) {
 }
 template <class D>
 HWY_INLINE Real<D> ToReal(D d, int32_t field) {
-  return hn::Set(d, static_cast<float>(field));
+  return Broadcast(d, static_cast<float>(field));
 }
 template <class D>
 HWY_INLINE Real<D> ToReal(D d, Int<D> field) {
@@ -115,7 +115,7 @@ class SharedRecord {
     return reinterpret_cast<const int32_t*>(record_)[offset / 4];
   }
   HWY_INLINE Real<D> RealAt(size_t offset) const {
-    return hn::Set(D(), reinterpret_cast<const float*>(record_)[offset / 4]);
+    return Broadcast(D(), reinterpret_cast<const float*>(record_)[offset / 4]);
   }
   /// Word `index` of an array of words in the record.
   HWY_INLINE Int<D> WordAt(size_t offset, Int<D> index) const {
@@ -165,6 +165,14 @@ struct Nearest {
   bool any;
 };
 
+/// The integer that `x`, integral in [0, 2^22], holds: by its bits, without the care that Highway's
+/// conversion takes of values too large for an integer.
+template <class D>
+HWY_INLINE Int<D> ToTexel(D d, Real<D> x) {
+  const IntTag<D> di;
+  return hn::BitCast(di, x + Splat(d, 0x1p23)) - Broadcast(di, 0x4b000000);
+}
+
 /// The two texels of one axis and the weight of the second.
 template <class D>
 struct Axis {
@@ -177,7 +185,6 @@ struct Axis {
 template <class D, class Field>
 HWY_INLINE Axis<D> ResolveAxis(D d, Real<D> u, Field wrap, Real<D> size,
                                const Nearest<D>& nearest) {
-  const IntTag<D> di;
   const Real<D> zero = hn::Zero(d), last = size - Splat(d, 1);
   const Real<D> x = WrapUnit(d, u, wrap) * size;
   Real<D> position = x - Splat(d, 0.5);
@@ -191,8 +198,8 @@ HWY_INLINE Axis<D> ResolveAxis(D d, Real<D> u, Field wrap, Real<D> size,
   const auto repeat = Test(d, wrap, kWrapRepeat);
   const Real<D> before = Choose(d, repeat, last_texel, first_texel);
   const Real<D> after = Choose(d, repeat, first_texel, last_texel);
-  return {hn::ConvertTo(di, hn::IfThenElse(hn::Lt(low, zero), before, low)),
-          hn::ConvertTo(di, hn::IfThenElse(hn::Gt(high, last), after, high)), position - low};
+  return {ToTexel(d, hn::IfThenElse(hn::Lt(low, zero), before, low)),
+          ToTexel(d, hn::IfThenElse(hn::Gt(high, last), after, high)), position - low};
 }
 
 /// How texels are stored; `Condition` is bool or Mask<D>.
@@ -203,7 +210,7 @@ struct Encoding {
 };
 template <class D, class Field>
 HWY_INLINE auto MakeEncoding(D d, Field format, Field srgb_flag) {
-  const auto wide = Test(d, format, static_cast<int32_t>(TexelFormat::rgba16));
+  auto wide = Test(d, format, static_cast<int32_t>(TexelFormat::rgba16));
   const Real<D> scale = Choose(
       d, wide, [&] { return Splat(d, 1.0 / 65535); }, [&] { return Splat(d, 1.0 / 255); });
   return Encoding<D, decltype(wide)>{wide, Inverse(Test(d, srgb_flag, 0)), scale};
@@ -344,25 +351,83 @@ HWY_INLINE Level<D> ChooseLevel(D d, Field filter, Real<D> lod, Real<D> last, Re
   return {number, {mask, !hn::AllFalse(d, mask)}};
 }
 
+/// A texel as four lanes, R first: what one path at a time makes of SIMD, with the same bits.
+using Channels = hn::Vec<hn::FixedTag<float, 4>>;
+template <class Code>
+HWY_INLINE Channels DecodeChannels(const float* srgb, const Code* HWY_RESTRICT codes,
+                                   double scale) {
+  const hn::FixedTag<float, 4> df;
+  if (srgb == nullptr) {
+    const hn::FixedTag<Code, 4> dc;
+    const hn::FixedTag<int32_t, 4> di;
+    return hn::ConvertTo(df, hn::PromoteTo(di, hn::LoadU(dc, codes))) * Splat(df, scale);
+  }
+  // Built in registers: four stores and a load of them all would stall.
+  const hn::FixedTag<float, 1> d1;
+  const hn::FixedTag<float, 2> d2;
+  const float alpha = static_cast<float>(codes[3]) * static_cast<float>(scale);
+  return hn::Combine(
+      df, hn::Combine(d2, hn::LoadU(d1, &alpha), hn::LoadU(d1, srgb + codes[2])),
+      hn::Combine(d2, hn::LoadU(d1, srgb + codes[1]), hn::LoadU(d1, srgb + codes[0])));
+}
+
+/// `Filter` for one lane.
+template <class D>
+HWY_INLINE Rgba<D> FilterOne(D d, const TextureTablesView& t, const Encoding<D, bool>& encoding,
+                             Int<D> offset, Int<D> width, const Axis<D>& x, const Axis<D>& y,
+                             bool nearest_only) {
+  const hn::FixedTag<float, 4> df;
+  const uint32_t* const level = t.words + hn::GetLane(offset);
+  const int32_t left = hn::GetLane(x.low), right = hn::GetLane(x.high);
+  const int32_t top = hn::GetLane(y.low) * hn::GetLane(width),
+                bottom = hn::GetLane(y.high) * hn::GetLane(width);
+  const float* const narrow_table = encoding.srgb ? t.srgb8 : nullptr;
+  const float* const wide_table = encoding.srgb ? t.srgb16 : nullptr;
+  const auto decode = [&](int32_t texel) {
+    return encoding.wide
+               ? DecodeChannels(wide_table, reinterpret_cast<const uint16_t*>(level + 2 * texel),
+                                1.0 / 65535)
+               : DecodeChannels(narrow_table, reinterpret_cast<const uint8_t*>(level + texel),
+                                1.0 / 255);
+  };
+  const auto lerp = [&](Channels a, Channels b, Real<D> weight) {
+    return hn::MulAdd(b - a, hn::Set(df, hn::GetLane(weight)), a);
+  };
+  Channels color = decode(top + left);
+  if (!nearest_only) {
+    const Channels above = lerp(color, decode(top + right), x.weight);
+    const Channels below = lerp(decode(bottom + left), decode(bottom + right), x.weight);
+    color = lerp(above, below, y.weight);
+  }
+  HWY_ALIGN float channel[4];
+  hn::Store(color, df, channel);
+  return {{hn::LoadU(d, channel), hn::LoadU(d, channel + 1), hn::LoadU(d, channel + 2)},
+          hn::LoadU(d, channel + 3)};
+}
+
 /// The four texels around a point, blended; only the nearest one is read if no lane wants more. All
 /// are fetched before any is decoded, so that their cache misses overlap.
 template <class D, class Condition>
 HWY_INLINE Rgba<D> Filter(D d, const TextureTablesView& t, const Encoding<D, Condition>& encoding,
                           Int<D> offset, Int<D> width, const Axis<D>& x, const Axis<D>& y,
                           bool nearest_only) {
-  const auto fetch = [&](Int<D> texel) { return FetchTexel(d, t, encoding, offset, texel); };
-  const auto decode = [&](const TexelWords<D>& words) {
-    return DecodeTexel(d, t, encoding, words);
-  };
-  const Int<D> top = y.low * width;
-  const TexelWords<D> top_left = fetch(top + x.low);
-  if (nearest_only) return decode(top_left);
-  const Int<D> bottom = y.high * width;
-  const TexelWords<D> bottom_left = fetch(bottom + x.low);
-  const TexelWords<D> top_right = fetch(top + x.high);
-  const TexelWords<D> bottom_right = fetch(bottom + x.high);
-  return Lerp(Lerp(decode(top_left), decode(top_right), x.weight),
-              Lerp(decode(bottom_left), decode(bottom_right), x.weight), y.weight);
+  if constexpr (hn::MaxLanes(D()) == 1) {
+    return FilterOne(d, t, encoding, offset, width, x, y, nearest_only);
+  } else {
+    const auto fetch = [&](Int<D> texel) { return FetchTexel(d, t, encoding, offset, texel); };
+    const auto decode = [&](const TexelWords<D>& words) {
+      return DecodeTexel(d, t, encoding, words);
+    };
+    const Int<D> top = y.low * width;
+    const TexelWords<D> top_left = fetch(top + x.low);
+    if (nearest_only) return decode(top_left);
+    const Int<D> bottom = y.high * width;
+    const TexelWords<D> bottom_left = fetch(bottom + x.low);
+    const TexelWords<D> top_right = fetch(top + x.high);
+    const TexelWords<D> bottom_right = fetch(bottom + x.high);
+    return Lerp(Lerp(decode(top_left), decode(top_right), x.weight),
+                Lerp(decode(bottom_left), decode(bottom_right), x.weight), y.weight);
+  }
 }
 
 /// The sample of one vector. `slot` and `texture` are records that exist in every lane.
@@ -382,8 +447,8 @@ HWY_INLINE Rgba<D> Sample(D d, const TextureTablesView& t, const Slot& slot, con
       ChooseLevel(d, slot.IntAt(offsetof(TextureSlot, filter)), lod, last, u_level);
 
   // 2^-level by its exponent bits: exact, and free of the per-lane shifts that SSE4 lacks.
-  const Int<D> number = hn::ConvertTo(di, level.number);
-  const Real<D> shrink = hn::BitCast(d, hn::ShiftLeft<23>(hn::Set(di, 127) - number));
+  const Int<D> number = ToTexel(d, level.number);
+  const Real<D> shrink = hn::BitCast(d, hn::ShiftLeft<23>(Broadcast(di, 127) - number));
   const Real<D> width = hn::Max(hn::Floor(width0 * shrink), Splat(d, 1));
   const Real<D> height = hn::Max(hn::Floor(height0 * shrink), Splat(d, 1));
   const Int<D> offset = texture.WordAt(offsetof(Texture, level_offset), number);
@@ -396,7 +461,7 @@ HWY_INLINE Rgba<D> Sample(D d, const TextureTablesView& t, const Slot& slot, con
       ResolveAxis(d, at.v, slot.IntAt(offsetof(TextureSlot, wrap_t)), height, level.nearest);
   const bool nearest_only =
       level.nearest.any && hn::AllFalse(d, hn::AndNot(level.nearest.mask, active));
-  return Filter(d, t, encoding, offset, hn::ConvertTo(di, width), x, y, nearest_only);
+  return Filter(d, t, encoding, offset, ToTexel(d, width), x, y, nearest_only);
 }
 
 }  // namespace texture_detail
@@ -412,18 +477,21 @@ HWY_NOINLINE Rgba<D> SampleTexture(D d, const TextureTablesView& t, Int<D> slot,
   const intptr_t lane = hn::FindFirstTrue(d, active);
   if (lane < 0) return {Splat3(d, 0, 0, 0), hn::Zero(d)};
   const int32_t first = hn::ExtractLane(slot, static_cast<size_t>(lane));
-  // Inactive lanes read what an active one reads, so that every gather is in range.
-  const Int<D> valid = hn::IfThenElse(hn::RebindMask(di, active), slot, hn::Set(di, first));
   using namespace texture_detail;
-  if (hn::MaxLanes(D()) == 1 || hn::AllTrue(di, hn::Eq(valid, hn::Set(di, first)))) {
-    const TextureSlot& shared = t.slots[first];
-    return Sample(d, t, SharedRecord<TextureSlot, D>(&shared),
-                  SharedRecord<Texture, D>(t.textures + shared.texture), active, uv, log2_footprint,
-                  u_level);
+  if constexpr (hn::MaxLanes(D()) > 1) {
+    // Inactive lanes read what an active one reads, so that every gather is in range.
+    const Int<D> valid = hn::IfThenElse(hn::RebindMask(di, active), slot, hn::Set(di, first));
+    if (!hn::AllTrue(di, hn::Eq(valid, hn::Set(di, first)))) {
+      const LaneRecords<TextureSlot, D> slots(t.slots, valid);
+      const LaneRecords<Texture, D> textures(t.textures,
+                                             slots.IntAt(offsetof(TextureSlot, texture)));
+      return Sample(d, t, slots, textures, active, uv, log2_footprint, u_level);
+    }
   }
-  const LaneRecords<TextureSlot, D> slots(t.slots, valid);
-  const LaneRecords<Texture, D> textures(t.textures, slots.IntAt(offsetof(TextureSlot, texture)));
-  return Sample(d, t, slots, textures, active, uv, log2_footprint, u_level);
+  const TextureSlot& shared = t.slots[first];
+  return Sample(d, t, SharedRecord<TextureSlot, D>(&shared),
+                SharedRecord<Texture, D>(t.textures + shared.texture), active, uv, log2_footprint,
+                u_level);
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

@@ -152,8 +152,8 @@ template <class D>
 HWY_INLINE Real<D> FastLog2(D d, Real<D> x) {
   const IntTag<D> di;
   const Int<D> bits = hn::BitCast(di, x);
-  const Real<D> exponent = hn::ConvertTo(d, hn::ShiftRight<23>(bits) - hn::Set(di, 127));
-  const Int<D> mantissa = hn::Or(hn::And(bits, hn::Set(di, 0x7fffff)), hn::Set(di, 0x3f800000));
+  const Real<D> exponent = hn::ConvertTo(d, hn::ShiftRight<23>(bits) - Broadcast(di, 127));
+  const Int<D> mantissa = hn::Or(hn::And(bits, Broadcast(di, 0x7fffff)), Broadcast(di, 0x3f800000));
   const Real<D> t = hn::BitCast(d, mantissa) - Splat(d, 1);
   Real<D> q = Splat(d, 0.0451482938);  // t * q(t) ~ log2(1 + t), q(1) = 1
   q = hn::MulAdd(q, t, Splat(d, -0.193573782));
