@@ -57,7 +57,7 @@ void OpenTable::open(const StageLayout& stage, std::uint32_t bin) {
                    .begin = data,
                    .level = 0};
   set_grade(level.grade, stage.first_bit + bin);
-  ++count_;
+  count_.add(1);
   if (layout_.track_age) {
     link(index);
   }
@@ -96,7 +96,7 @@ Block OpenTable::remove(std::uint32_t bit) {
                     .level = static_cast<std::uint8_t>(slot.level)};
   clear_grade(stage.levels[slot.level].grade, bit);
   slot = {};
-  --count_;
+  count_.set(count_.get() - 1);
   if (layout_.track_age) {
     unlink(index);
   }
@@ -104,7 +104,7 @@ Block OpenTable::remove(std::uint32_t bit) {
 }
 
 bool OpenTable::take_best(Block& block) {
-  if (count_ == 0) {
+  if (count() == 0) {
     return false;
   }
   block = remove(choose());

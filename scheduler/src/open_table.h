@@ -12,6 +12,7 @@
 #include "carpool/emitter.h"
 #include "carpool/policy.h"
 #include "layout.h"
+#include "stats.h"
 
 namespace carpool {
 
@@ -50,7 +51,7 @@ class OpenTable final : public Emitter {
   bool take_older_than(std::uint64_t ticks, Block& block);
 
   // How many blocks are open.
-  std::uint32_t count() const { return count_; }
+  std::uint32_t count() const { return static_cast<std::uint32_t>(count_.get()); }
 
   // set_time says what time blocks that are opened from now on get.
   void set_time(std::uint64_t ticks) { now_ = ticks; }
@@ -102,7 +103,7 @@ class OpenTable final : public Emitter {
   std::uint32_t oldest_ = Bitmap::kNone;
   std::uint32_t newest_ = Bitmap::kNone;
   std::uint32_t cursor_ = 0;
-  std::uint32_t count_ = 0;
+  Counter count_;  // others may look at it
   std::uint64_t now_ = 0;
 };
 

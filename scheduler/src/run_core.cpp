@@ -64,9 +64,12 @@ RunCore::RunCore(const Graph& g, const RunOptions& o, std::uint32_t worker_count
   for (std::uint32_t i = 0; i < worker_count; ++i) {
     workers_.push_back(std::make_unique<Worker>(*this, i));
   }
+  options.monitor.show(*this);
 }
 
-RunCore::~RunCore() = default;
+RunCore::~RunCore() {
+  options.monitor.forget(*this);
+}
 
 void RunCore::serve(bool searching) {
   const std::uint32_t seat = gate->take_seat();
@@ -160,6 +163,26 @@ void RunCore::maybe_report_progress() {
   options.progress(progress);
   next_progress_ns_.store(now + std::chrono::nanoseconds(options.progress_every).count(),
                           std::memory_order_release);
+}
+
+RunState RunCore::state() const {
+  const Gate::View view = gate->relaxed_view();
+  RunState state{.active = view.active(),
+                 .searching = view.searching(),
+                 .invited = view.invited(),
+                 .caller_asleep = view.caller_asleep(),
+                 .stopped = gate->stopped(),
+                 .over = view.closed(),
+                 .credits = credits.available()};
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    state.sources.push_back({.name = graph.sources()[i].options.name,
+                             .inside = sources_[i].inside.load(std::memory_order_relaxed),
+                             .exhausted = sources_[i].exhausted.load(std::memory_order_relaxed)});
+  }
+  for (const auto& worker : workers_) {
+    state.workers.push_back(worker->state());
+  }
+  return state;
 }
 
 namespace {

@@ -64,6 +64,9 @@ class RunCore {
 
   void maybe_report_progress();
 
+  // state is for another thread, while the run is under way.
+  RunState state() const;
+
   Worker& worker(std::uint32_t index) { return *workers_[index]; }
 
   // allowed_from returns, by stage, whether a node has declared an edge to it; null if it has

@@ -17,6 +17,7 @@ class Counter {
     // Relaxed: a statistic. Exact numbers are read after the run, when the gate has synchronised.
     value_.store(value_.load(std::memory_order_relaxed) + amount, std::memory_order_relaxed);
   }
+  void set(std::uint64_t value) { value_.store(value, std::memory_order_relaxed); }
   std::uint64_t get() const { return value_.load(std::memory_order_relaxed); }
 
  private:
@@ -39,6 +40,9 @@ struct SourceStats {
   std::uint64_t ticks = 0;
 };
 
+// Activity says what a worker is doing.
+enum Activity : std::uint64_t { kAway, kSearching, kBetweenBatches, kInNode };
+
 struct WorkerStats {
   WorkerStats(std::size_t stage_count, std::size_t source_count, std::size_t slots)
       : stages(stage_count), sources(source_count), bins(slots) {}
@@ -48,6 +52,7 @@ struct WorkerStats {
   std::vector<BinReport> bins;
   Counter batches;
   Counter items;
+  Counter doing;  // an Activity, or that plus the number of a stage or, after those, a source
   std::uint64_t arrivals = 0;
   std::uint64_t present_ticks = 0;
   std::uint64_t search_ticks = 0;

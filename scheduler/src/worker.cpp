@@ -66,6 +66,7 @@ void Worker::serve(bool searching) {
 void Worker::begin_shift(bool searching) {
   came_ = now_ = search_began_ = core_.clock.ticks();
   searching_ = searching;
+  stats_.doing.set(searching ? kSearching : kBetweenBatches);
   ++stats_.arrivals;
   check_end();
 }
@@ -89,6 +90,34 @@ void Worker::end_shift() {
     gate_.begin_search();  // leave() expects it
   }
   stats_.present_ticks += left - came_;
+  stats_.doing.set(kAway);
+}
+
+RunState::Worker Worker::state() const {
+  const std::uint64_t doing = stats_.doing.get();
+  const auto name = [&]() -> std::string {
+    switch (doing) {
+      case kAway:
+        return "away";
+      case kSearching:
+        return "searching";
+      case kBetweenBatches:
+        return "between batches";
+      default:
+        break;
+    }
+    const std::uint64_t node = doing - kInNode;
+    const auto& stages = core_.graph.stages();
+    return node < stages.size()
+               ? "in stage " + stages[node].options.name
+               : "in source " + core_.graph.sources()[node - stages.size()].options.name;
+  };
+  return {.doing = name(),
+          .ready_blocks = ready_.size(),
+          .ready_partial = ready_.partials(),
+          .open_blocks = open_.count(),
+          .batches = stats_.batches.get(),
+          .items = stats_.items.get()};
 }
 
 // The order of the whole scheduler is here: what is ready; then new items while credits are plenty,
@@ -196,6 +225,7 @@ void Worker::perform(const Work& work) {
   } else {
     run_batch(work);
   }
+  stats_.doing.set(kBetweenBatches);
   after_call();
 }
 
@@ -204,6 +234,7 @@ void Worker::run_batch(const Work& work) {
   const bool tiny = block.items < kTinyBatch && !always_timed_ && !stats_.stages[block.stage].slow;
   const bool timed = !tiny || ++tiny_batches_ >= kTinySample;
   const std::uint64_t began = timed ? core_.clock.ticks() : 0;
+  stats_.doing.set(kInNode + block.stage);
   open_.begin_call(block.stage, core_.allowed_from(block.stage));
   core_.graph.stages()[block.stage].kernel(
       {.data = block.data, .items = block.items, .bin = block.bin, .worker = index_}, open_);
@@ -244,10 +275,10 @@ void Worker::count_batch(const Work& work, std::uint64_t ticks) {
 void Worker::call_source(const Work& work) {
   const std::uint64_t began = core_.clock.ticks();
   SourceContext context{.worker = index_, .budget = work.budget};
+  const auto node = static_cast<std::uint32_t>(layout_.stages.size()) + work.source;
+  stats_.doing.set(kInNode + node);
   open_.set_time(began);
-  open_.begin_call(
-      static_cast<std::uint32_t>(layout_.stages.size()) + work.source,
-      core_.allowed_from(static_cast<std::uint32_t>(layout_.stages.size()) + work.source));
+  open_.begin_call(node, core_.allowed_from(node));
   const SourceStatus status = core_.graph.sources()[work.source].function(context, open_);
   const std::uint64_t tally = open_.end_call();
   if ((tally & 0xffffffffU) > work.budget) {
@@ -370,6 +401,7 @@ bool Worker::begin_search() {
   credits_.return_all();  // before looking at the sources: see Gate
   if (!searching_) {
     searching_ = true;
+    stats_.doing.set(kSearching);
     search_began_ = core_.clock.ticks();
     gate_.begin_search();
   }

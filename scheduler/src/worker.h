@@ -25,6 +25,9 @@ class Worker final : private BlockSink {
   const WorkerStats& stats() const { return stats_; }
   const CreditCache& credits() const { return credits_; }
 
+  // state is for other threads, at any time.
+  RunState::Worker state() const;
+
   // drop_all forgets every block and returns how many items were in them. After the run only.
   std::uint64_t drop_all();
 

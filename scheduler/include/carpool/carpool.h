@@ -6,6 +6,7 @@
 #include "carpool/emitter.h"
 #include "carpool/errors.h"
 #include "carpool/graph.h"
+#include "carpool/monitor.h"
 #include "carpool/policy.h"
 #include "carpool/report.h"
 #include "carpool/run.h"

@@ -11,6 +11,7 @@
 
 #include "carpool/cancel.h"
 #include "carpool/graph.h"
+#include "carpool/monitor.h"
 #include "carpool/policy.h"
 #include "carpool/report.h"
 
@@ -87,6 +88,9 @@ struct RunOptions {
 
   /// Ends the run when this moment has come; bounded by one batch per worker.
   std::optional<std::chrono::steady_clock::time_point> deadline = std::nullopt;
+
+  /// Lets other threads look at the run. The default shows nothing.
+  Monitor monitor = Monitor(nullptr);
 
   /// Called by one worker at a time, between batches, about every `progress_every`. Keep it short.
   /// Exceptions end the run.
