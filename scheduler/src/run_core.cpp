@@ -53,7 +53,9 @@ RunCore::RunCore(const Graph& g, const RunOptions& o, std::uint32_t worker_count
       gate(std::make_shared<Gate>(worker_count)),
       credits(o.in_flight),
       pool(layout, o.overflow),
-      clock(o.mode == RunMode::simulated),
+      clock(o.mode == RunMode::simulated
+                ? RunClock(o.simulation.start.value_or(std::chrono::steady_clock::now()))
+                : RunClock()),
       linger_ticks(o.mode == RunMode::simulated ? static_cast<std::uint64_t>(o.flush.linger.count())
                                                 : to_ticks(o.flush.linger)),
       summoner_(summoner),

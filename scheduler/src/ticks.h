@@ -29,8 +29,6 @@ class TickClock {
  public:
   TickClock() : start_(std::chrono::steady_clock::now()), start_ticks_(read_ticks()) {}
 
-  std::chrono::steady_clock::time_point start() const { return start_; }
-
   double seconds() const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
@@ -49,7 +47,10 @@ class TickClock {
 // RunClock is the time of a run: of the machine, or virtual, in nanoseconds, when somebody sets it.
 class RunClock {
  public:
-  explicit RunClock(bool is_virtual) : virtual_(is_virtual) {}
+  RunClock() = default;
+  // A virtual clock, which stands until it is set.
+  explicit RunClock(std::chrono::steady_clock::time_point start)
+      : virtual_(true), virtual_start_(start) {}
 
   std::uint64_t ticks() const { return virtual_ ? virtual_ticks_ : read_ticks(); }
   double seconds() const {
@@ -57,7 +58,7 @@ class RunClock {
   }
   double seconds_per_tick() const { return virtual_ ? 1e-9 : real_.seconds_per_tick(); }
   std::chrono::steady_clock::time_point now() const {
-    return virtual_ ? real_.start() + std::chrono::nanoseconds(virtual_ticks_)
+    return virtual_ ? virtual_start_ + std::chrono::nanoseconds(virtual_ticks_)
                     : std::chrono::steady_clock::now();
   }
   bool is_virtual() const { return virtual_; }
@@ -65,7 +66,8 @@ class RunClock {
 
  private:
   TickClock real_;
-  const bool virtual_;
+  const bool virtual_ = false;
+  const std::chrono::steady_clock::time_point virtual_start_{};
   std::uint64_t virtual_ticks_ = 0;
 };
 

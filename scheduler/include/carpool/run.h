@@ -31,6 +31,10 @@ enum class RunMode {
 struct Simulation {
   std::uint64_t seed = 1;
 
+  /// The moment at which virtual time begins; deadlines are counted from it. Default: when the run
+  /// begins, which makes no two runs with a deadline quite the same.
+  std::optional<std::chrono::steady_clock::time_point> start = std::nullopt;
+
   /// How long a batch of so many items of a stage takes. Empty: 100 ns and 20 ns per item.
   std::function<double(std::uint32_t stage, std::uint32_t items)> batch_seconds = {};
 

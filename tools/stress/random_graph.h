@@ -1,8 +1,9 @@
-// Random graphs whose result is known: for property tests.
+// Random graphs whose result is known: for carpool-stress and for property tests.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -29,7 +30,10 @@ struct Shape {
   std::uint32_t fan_out = 1;  // the most live items that one source item becomes
   std::uint32_t source_concurrency = 1;
   bool one_bin_flood = false;     // everything goes to bin 0
-  bool uneven = false;            // some kernels take much longer
+  bool uneven = false;            // some items take a hundred times as long
+  bool lumps = false;             // one item in a thousand takes ten thousand times as long
+  bool sleeping = false;          // some kernel calls sleep for up to a quarter of a millisecond
+  bool ping_pong = false;         // items go back and forth between the first two stages
   bool split_early = false;       // fan out as much and as soon as possible
   bool explicit_weights = false;  // the last stage never splits, and says so
 };
@@ -49,12 +53,17 @@ class RandomGraph {
 
   carpool::Graph& graph() { return graph_; }
   Tally counted() const;                      // what the kernels saw; call it after the run
-  Tally expected() const;                     // what they must have seen
+  Tally expected() const;                     // what they must have seen in a whole run
+  Tally admitted() const;                     // the part of it that the sources have let in
   void forbid_calls() { over_.store(true); }  // from now on every kernel call is a mistake
   std::uint64_t late_calls() const { return late_.load(); }
 
-  // Called at the start of every kernel call, when set.
+  // A mistake, for tests of tests: some items are taken for handled.
+  bool lose_items = false;
+
+  // Called at the start of every kernel call and every source call, when set.
   std::function<void()> on_batch;
+  std::function<void()> on_source;
 
  private:
   struct Item {
@@ -73,6 +82,8 @@ class RandomGraph {
   template <class Emit>
   void successors(const Item& item, Emit emit) const;
   void add_to(Tally& tally, const Item& item) const;
+  Tally tally_of_first(const std::function<std::uint64_t(std::uint32_t)>& items) const;
+  void take_time(const Item& item) const;
   void work(const carpool::Batch<Item>& batch, carpool::Emitter& out);
   carpool::SourceStatus produce(std::uint32_t source, carpool::SourceContext& ctx,
                                 carpool::Emitter& out);

@@ -38,6 +38,9 @@ Shape random_shape(std::uint64_t seed) {
           .source_concurrency = dice(8, 3),
           .one_bin_flood = dice(9, 5) == 0,
           .uneven = dice(10, 3) == 0,
+          .lumps = dice(13, 12) == 0,
+          .sleeping = dice(14, 20) == 0,
+          .ping_pong = dice(15, 8) == 0,
           .split_early = dice(11, 2) == 0,
           .explicit_weights = dice(12, 2) == 0};
 }

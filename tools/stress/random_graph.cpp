@@ -2,18 +2,30 @@
 #include "random_graph.h"
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 namespace carpool_test {
 
 namespace {
+
 constexpr std::size_t kMostWorkers = 256;
+
+void compute(std::uint64_t seed, int rounds) {
+  for (int i = 0; i < rounds; ++i) {
+    seed = mix(seed);
+  }
+  asm volatile("" : "+r"(seed));  // keeps the loop
 }
+
+}  // namespace
 
 RandomGraph::RandomGraph(const Shape& shape)
     : shape_(shape),
       next_(std::make_unique<std::atomic<std::uint64_t>[]>(shape.sources)),
       counts_(kMostWorkers) {
   shape_.explicit_weights = shape.explicit_weights && shape.stages > 1;
+  shape_.ping_pong = shape.ping_pong && shape.stages > 1;
   for (std::uint32_t s = 0; s < shape.stages; ++s) {
     const std::uint64_t dice = mix(shape.seed * 1000 + s);
     const auto bins = static_cast<std::uint32_t>(1 + dice % shape.most_bins);
@@ -58,7 +70,8 @@ RandomGraph::Item RandomGraph::root(std::uint32_t source, std::uint64_t index) c
 
 std::uint32_t RandomGraph::stage_of(const Item& item) const {
   const auto count = shape_.stages;
-  const auto stage = static_cast<std::uint32_t>((item.path >> 33) % count);
+  const auto stage =
+      shape_.ping_pong ? item.hops % 2 : static_cast<std::uint32_t>((item.path >> 33) % count);
   // With explicit weights, only items that can no longer split may go to the last stage.
   return shape_.explicit_weights && item.width > 1 && stage + 1 == count ? 0 : stage;
 }
@@ -97,28 +110,43 @@ void RandomGraph::work(const carpool::Batch<Item>& batch, carpool::Emitter& out)
   if (on_batch) {
     on_batch();
   }
+  if (const std::uint64_t dice = batch.items.front().path; shape_.sleeping && dice % 8 == 0) {
+    std::this_thread::sleep_for(std::chrono::microseconds((dice >> 8) % 250));
+  }
   Tally& tally =
       counts_[batch.worker].tally;  // not atomic: the scheduler promises one call per worker
   for (const Item& item : batch.items) {
+    if (lose_items && item.path % 999 == 0) {
+      continue;
+    }
     if (bin_of(item) != batch.bin) {
       tally.sum += 1;  // spoils the comparison
     }
     ++tally.visits;
     tally.sum += visit_value(item);
-    if (shape_.uneven && item.path % 64 == 0) {
-      std::uint64_t x = item.path;
-      for (int i = 0; i < 2000; ++i) {
-        x = mix(x);
-      }
-      asm volatile("" : "+r"(x));  // keeps the loop
-    }
+    take_time(item);
     successors(
         item, [&](const Item& child) { out.emit(stages_[stage_of(child)], bin_of(child), child); });
   }
 }
 
+void RandomGraph::take_time(const Item& item) const {
+  if (shape_.uneven && item.path % 64 == 0) {
+    compute(item.path, 2000);
+  }
+  if (shape_.lumps && item.path % 1024 == 1) {
+    compute(item.path, 200'000);
+  }
+}
+
 carpool::SourceStatus RandomGraph::produce(std::uint32_t source, carpool::SourceContext& ctx,
                                            carpool::Emitter& out) {
+  if (over_.load()) {
+    late_.fetch_add(1);
+  }
+  if (on_source) {
+    on_source();
+  }
   const std::uint64_t first = next_[source].fetch_add(ctx.budget);
   const std::uint64_t last = std::min<std::uint64_t>(shape_.items, first + ctx.budget);
   for (std::uint64_t index = first; index < last; ++index) {
@@ -144,14 +172,24 @@ void RandomGraph::add_to(Tally& tally, const Item& item) const {
   successors(item, [&](const Item& child) { add_to(tally, child); });
 }
 
-Tally RandomGraph::expected() const {
+Tally RandomGraph::tally_of_first(const std::function<std::uint64_t(std::uint32_t)>& items) const {
   Tally tally;
   for (std::uint32_t source = 0; source < shape_.sources; ++source) {
-    for (std::uint64_t index = 0; index < shape_.items; ++index) {
+    for (std::uint64_t index = 0; index < items(source); ++index) {
       add_to(tally, root(source, index));
     }
   }
   return tally;
+}
+
+Tally RandomGraph::expected() const {
+  return tally_of_first([this](std::uint32_t) { return shape_.items; });
+}
+
+Tally RandomGraph::admitted() const {
+  return tally_of_first([this](std::uint32_t source) {
+    return std::min<std::uint64_t>(shape_.items, next_[source].load());
+  });
 }
 
 }  // namespace carpool_test
