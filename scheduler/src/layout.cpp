@@ -16,8 +16,7 @@ namespace {
 
 constexpr std::uint32_t kLine = 64;
 constexpr std::uint64_t kMaxBlockBytes = 64ULL << 20;
-constexpr std::uint64_t kMaxCredits =
-    1ULL << 31;  // so that one call's tally cannot overflow its 32 bits
+constexpr std::uint64_t kMaxCredits = 1ULL << 31;  // fits kTallyShift bits
 
 std::uint64_t round_up_to_line(std::uint64_t bytes) {
   return (bytes + kLine - 1) / kLine * kLine;
@@ -62,7 +61,8 @@ void Layout::set_weights(const Graph& graph) {
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const std::uint32_t declared = graph.stages()[i].options.weight;
     stages[i].weight = declared != 0 ? declared : fan_out;
-    tally_of.push_back(std::uint64_t{stages[i].weight} << 32 | 1);
+    weight_of.push_back(stages[i].weight);
+    tally_of.push_back(std::uint64_t{stages[i].weight} << kTallyShift | 1);
   }
   for (const auto& source : graph.sources()) {
     std::uint64_t charge = source.options.fan_out;

@@ -13,6 +13,8 @@ namespace carpool {
 
 inline constexpr std::uint32_t kMaxLevels = 16;
 inline constexpr std::uint32_t kGrades = 7;  // see OpenTable
+inline constexpr unsigned kTallyShift =
+    32;  // a source's budget in credits and in items fits 32 bits
 inline constexpr std::uint32_t kPartialsPerWorker =
     16;  // published partial blocks a worker may have out
 
@@ -71,8 +73,11 @@ struct Layout {
   bool track_age = false;        // are open blocks linked by age?
   std::uint32_t node_class = 0;  // the pool class that ReadyBlocks come from
   std::vector<StageLayout> stages;
-  std::vector<PoolClass> classes;       // ascending in size
-  std::vector<std::uint64_t> tally_of;  // by stage; see Emitter
+  std::vector<PoolClass> classes;  // ascending in size
+  // What one emit adds to the tally, by stage. For kernels: the credits that the item holds. For
+  // sources, whose budget is counted in items: those credits << kTallyShift, and one item.
+  std::vector<std::uint64_t> weight_of;
+  std::vector<std::uint64_t> tally_of;
   std::vector<SourceLayout> sources;
   std::int64_t least_plenty = 0;  // the smallest SourceLayout::plenty
   std::vector<std::uint32_t> stage_of_bit;

@@ -32,7 +32,6 @@ OpenTable::OpenTable(const Layout& layout, const Policy& policy, BlockCache& cac
     ages_.resize(layout.slots);
   }
   slots_ = table_.data();
-  tally_of_ = layout.tally_of.data();
 }
 
 void OpenTable::make_room(std::uint32_t stage_index, std::uint32_t bin) {

@@ -35,13 +35,23 @@ class OpenTable final : public Emitter {
  public:
   OpenTable(const Layout& layout, const Policy& policy, BlockCache& cache, BlockSink& sink);
 
-  // begin_call prepares for the emits of a kernel or source; end_call returns their tally.
-  void begin_call(std::uint32_t emitting, const std::uint8_t* allowed) {
-    emitting_ = emitting;
-    allowed_ = allowed;
-    tally_ = 0;
+  // begin_kernel and begin_source prepare for the emits of a call.
+  void begin_kernel(std::uint32_t stage, const std::uint8_t* allowed) {
+    begin_call(stage, allowed, layout_.weight_of.data(), 0);
   }
-  std::uint64_t end_call() const { return tally_; }
+  void begin_source(std::uint32_t node, const std::uint8_t* allowed) {
+    begin_call(node, allowed, layout_.tally_of.data(), kTallyShift);
+  }
+
+  // take_spent returns the credits that items hold which were emitted since it was last asked.
+  std::int64_t take_spent() {
+    const std::uint64_t spent = tally_ >> tally_shift_;
+    tally_ -= spent << tally_shift_;
+    return static_cast<std::int64_t>(spent);
+  }
+
+  // emitted_items counts what a source has emitted in this call.
+  std::uint32_t emitted_items() const { return static_cast<std::uint32_t>(tally_); }
 
   // take_best removes the block that should leave first. False if there is none.
   bool take_best(Block& block);
@@ -69,6 +79,14 @@ class OpenTable final : public Emitter {
     std::uint64_t opened = 0;
   };
 
+  void begin_call(std::uint32_t emitting, const std::uint8_t* allowed,
+                  const std::uint64_t* tally_of, unsigned tally_shift) {
+    emitting_ = emitting;
+    allowed_ = allowed;
+    tally_of_ = tally_of;
+    tally_shift_ = tally_shift;
+    tally_ = 0;
+  }
   void make_room(std::uint32_t stage, std::uint32_t bin) override;
   void open(const StageLayout& stage, std::uint32_t bin);
   void go_up(const StageLayout& stage, std::uint32_t bin);
@@ -96,6 +114,7 @@ class OpenTable final : public Emitter {
   const Policy& policy_;
   BlockCache& cache_;
   BlockSink& sink_;
+  unsigned tally_shift_ = 0;  // where the credits begin in the tally
   std::vector<detail::OpenSlot> table_;
   std::array<Bitmap, kGrades> grades_;
   std::uint32_t grades_in_use_ = 0;  // a bit per grade

@@ -235,7 +235,7 @@ void Worker::run_batch(const Work& work) {
   const bool timed = !tiny || ++tiny_batches_ >= kTinySample;
   const std::uint64_t began = timed ? core_.clock.ticks() : 0;
   stats_.doing.set(kInNode + block.stage);
-  open_.begin_call(block.stage, core_.allowed_from(block.stage));
+  open_.begin_kernel(block.stage, core_.allowed_from(block.stage));
   core_.graph.stages()[block.stage].kernel(
       {.data = block.data, .items = block.items, .bin = block.bin, .worker = index_}, open_);
   std::uint64_t ticks = 0;
@@ -251,8 +251,7 @@ void Worker::run_batch(const Work& work) {
   }
   count_batch(work, ticks);
   const StageLayout& stage = layout_.stages[block.stage];
-  const std::uint64_t tally = open_.end_call();
-  credits_.settle(static_cast<std::int64_t>(tally >> 32), std::int64_t{stage.weight} * block.items);
+  credits_.settle(open_.take_spent(), std::int64_t{stage.weight} * block.items);
   cache_.release(stage.levels[block.level].pool_class, block.data);
 }
 
@@ -278,19 +277,18 @@ void Worker::call_source(const Work& work) {
   const auto node = static_cast<std::uint32_t>(layout_.stages.size()) + work.source;
   stats_.doing.set(kInNode + node);
   open_.set_time(began);
-  open_.begin_call(node, core_.allowed_from(node));
+  open_.begin_source(node, core_.allowed_from(node));
   const SourceStatus status = core_.graph.sources()[work.source].function(context, open_);
-  const std::uint64_t tally = open_.end_call();
-  if ((tally & 0xffffffffU) > work.budget) {
+  if (open_.emitted_items() > work.budget) {
     throw std::logic_error("carpool: source '" + core_.graph.sources()[work.source].options.name +
                            "' emitted more items than its budget allowed");
   }
-  credits_.settle(static_cast<std::int64_t>(tally >> 32), 0);
+  credits_.settle(open_.take_spent(), 0);
   core_.leave_source(work.source, status == SourceStatus::exhausted);
   now_ = core_.clock.ticks();
   SourceStats& source = stats_.sources[work.source];
   ++source.calls;
-  source.items += tally & 0xffffffffU;
+  source.items += open_.emitted_items();
   source.ticks += now_ - began + work.virtual_ticks;
 }
 
@@ -347,6 +345,9 @@ void Worker::share() {
 }
 
 void Worker::publish(const Block& block, FlushCause cause) {
+  // Before others can retire these items: what they give back must have been taken, or a source
+  // would find credits that nobody has given back yet.
+  credits_.settle(open_.take_spent(), 0);
   auto* ready = ::new (cache_.allocate(layout_.node_class)) ReadyBlock;
   ready->block = block;
   ready->cause = cause;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "allocations.h"
@@ -244,6 +245,71 @@ TEST(ReportTest, ProgressIsCalledAndItsExceptionsArrive) {
   carpool_test::RandomGraph again({.seed = 2, .items = 20'000});
   options.progress = [](const carpool::Progress&) { throw std::runtime_error("progress"); };
   EXPECT_THROW(carpool::run(again.graph(), options), std::runtime_error);
+}
+
+// One root may become all the items there may be. Its first children are published, and retire on
+// another worker, while its kernel still emits; their credits must not admit a second root.
+TEST(CreditsTest, ChildrenThatRetireBeforeTheirParentAdmitNothing) {
+  carpool::Graph graph;
+  const carpool::Monitor monitor;
+  const auto split = graph.add_stage<int>({.name = "split", .block_items = 1});
+  const auto leaf = graph.add_stage<int>({.name = "leaf", .block_items = 4});
+  std::atomic<int> inside{0};
+  std::atomic<int> leaf_batches{0};
+  bool overlapped = false;
+  graph.set_kernel(split, [&](const Batch<int>& batch, Emitter& out) {
+    overlapped |= inside.fetch_add(1) != 0;
+    if (batch.items[0] == 0) {
+      for (int i = 0; i < 9; ++i) {
+        out.emit(leaf, 0, i);  // eight of them in two full blocks, which somebody else takes
+      }
+      while (leaf_batches < 2) {
+        std::this_thread::yield();
+      }
+      // They have retired. Whoever ran them now finds a source that may be called, or leaves.
+      for (auto state = monitor.look(); state->active > 1 && inside == 1; state = monitor.look()) {
+        std::this_thread::yield();
+      }
+    }
+    inside.fetch_sub(1);
+  });
+  graph.set_kernel(leaf, [&](const Batch<int>&, Emitter&) { ++leaf_batches; });
+  int roots = 0;
+  graph.add_source({.name = "roots", .fan_out = 16, .burst = 1}, [&](SourceContext&, Emitter& out) {
+    out.emit(split, 0, roots);
+    return ++roots == 2 ? SourceStatus::exhausted : SourceStatus::more;
+  });
+  const auto report = carpool::run(graph, {.threads = 2, .in_flight = 16, .monitor = monitor});
+  EXPECT_FALSE(overlapped);
+  EXPECT_EQ(report.stages[0].items, 2U);
+}
+
+// A root that emits so many items, of so many credits each, that their sum needs more than 32 bits.
+TEST(CreditsTest, OneCallMaySpendMoreThanFourBillion) {
+  carpool::Graph graph;
+  const auto split = graph.add_stage<int>({.name = "split", .block_items = 1});
+  constexpr int kChildren = 65'536;  // each in a bin of its own, so that no block is published
+  const auto leaf = graph.add_stage<int>({.name = "leaf", .bins = kChildren});
+  int alive = 0;
+  int most_alive = 0;
+  graph.set_kernel(split, [&](const Batch<int>&, Emitter& out) {
+    for (int i = 0; i < kChildren; ++i) {
+      out.emit(leaf, static_cast<std::uint32_t>(i), i);
+    }
+    alive += kChildren;
+    most_alive = std::max(most_alive, alive);
+  });
+  graph.set_kernel(leaf, [&](const Batch<int>& batch, Emitter&) {
+    alive -= static_cast<int>(batch.items.size());
+  });
+  int roots = 0;
+  graph.add_source({.name = "roots", .fan_out = 131'072}, [&](SourceContext&, Emitter& out) {
+    out.emit(split, 0, 0);
+    return ++roots == 3 ? SourceStatus::exhausted : SourceStatus::more;
+  });
+  carpool::run(graph, {.in_flight = 131'072, .mode = carpool::RunMode::serial});
+  EXPECT_EQ(most_alive, kChildren);
+  EXPECT_EQ(alive, 0);
 }
 
 TEST(AllocationTest, NoneInSteadyState) {

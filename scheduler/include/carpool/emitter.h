@@ -82,10 +82,10 @@ class Emitter {
   virtual void make_room(std::uint32_t stage, std::uint32_t bin) = 0;
 
   detail::OpenSlot* slots_ = nullptr;        // by first_slot + bin
-  const std::uint64_t* tally_of_ = nullptr;  // by stage: credits << 32 | 1
+  const std::uint64_t* tally_of_ = nullptr;  // by stage: what one emit adds to
   const std::uint8_t* allowed_ = nullptr;  // by stage: declared edge from who emits? null: no check
-  std::uint64_t tally_ = 0;     // what was emitted since last taken: credits << 32 | items
-  std::uint32_t emitting_ = 0;  // who emits, for the message
+  std::uint64_t tally_ = 0;                // of what was emitted; see Layout
+  std::uint32_t emitting_ = 0;             // who emits, for the message
 
  private:
   template <class T>
