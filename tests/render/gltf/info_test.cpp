@@ -24,7 +24,7 @@ SceneBuilder Everything() {
                              Json::object()};
   scene.json["textures"] = {{{"source", 0}}};
   scene.json["images"] = {{{"bufferView", scene.AddView(TinyPng())}}};
-  scene.json["animations"] = {Json::object()};
+  scene.json["animations"] = Json::array({Json::object()});
   return scene;
 }
 
