@@ -7,7 +7,7 @@
 
 namespace carpool {
 
-Gate::Gate(std::uint32_t seats) : seats_(seats), free_seats_((seats + 63) / 64), sizes_(seats) {
+Gate::Gate(std::uint32_t seats) : seats_(seats), free_seats_((seats + 63) / 64), sizes_(seats + 1) {
   for (std::uint32_t seat = 0; seat < seats; ++seat) {
     free_seats_[seat / 64].fetch_or(std::uint64_t{1} << (seat % 64), std::memory_order_relaxed);
   }
@@ -24,8 +24,7 @@ Gate::Invited Gate::invite() {
       if (!wake_caller) {
         return Invited::helper;
       }
-      signal_.store(1, std::memory_order_release);
-      signal_.notify_one();
+      signal_caller();
       return Invited::caller;
     }
   }
@@ -66,12 +65,31 @@ void Gate::release_seat(std::uint32_t seat) {
   free_seats_[seat / 64].fetch_or(std::uint64_t{1} << (seat % 64), std::memory_order_release);
 }
 
+void Gate::release_hold() {
+  std::uint64_t seen = state_.load(std::memory_order_seq_cst);
+  std::uint64_t next = 0;
+  do {
+    next = seen & ~kHeld;
+    if (View{next}.active() == 0) {
+      next |= kClosed;
+    }
+  } while (!state_.compare_exchange_weak(seen, next, std::memory_order_seq_cst));
+  if (View{next}.closed()) {
+    signal_caller();
+  }
+}
+
+void Gate::signal_caller() {
+  signal_.store(1, std::memory_order_release);  // release: hand on what came before the end
+  signal_.notify_one();
+}
+
 Gate::Left Gate::leave(bool caller) {
   std::uint64_t seen = state_.load(std::memory_order_seq_cst);
   std::uint64_t next = 0;
   do {
     next = seen - kActive - kSearching;
-    if (View{next}.active() == 0) {
+    if (View{next}.active() == 0 && !View{next}.held()) {
       next |= kClosed;
     } else if (caller) {
       next |= kCallerAsleep;
@@ -80,8 +98,7 @@ Gate::Left Gate::leave(bool caller) {
     // run().
   } while (!state_.compare_exchange_weak(seen, next, std::memory_order_seq_cst));
   if (View{next}.closed()) {
-    signal_.store(1, std::memory_order_release);
-    signal_.notify_one();
+    signal_caller();
     return Left::gone;
   }
   return !stopped() && any_ready() && come_back(caller) ? Left::stays : Left::gone;

@@ -26,6 +26,13 @@ namespace carpool {
 // would cost parallelism, not progress, because the publisher is active and will run the block
 // itself.
 //
+// A *hold* keeps the gate open while items lie outside, with stages that block or with what their
+// threads emitted (Exchange). It is set by an active worker, and released when no such item is left
+// and nobody needs to look at the sources because of one. Those threads are no workers; their items
+// need a worker to come, so for them a wake-up must not be lost. It is not: by the argument above
+// the invitation goes to the caller of run() if he sleeps, who always comes, and if he does not
+// sleep, he looks again before he does.
+//
 // The gate outlives the run in the hands of invitations that arrive too late; they find it closed.
 // All that a leaver reads after it has left is therefore in the gate.
 class Gate {
@@ -39,6 +46,7 @@ class Gate {
     std::uint32_t searching() const { return field(kSearchingShift); }
     std::uint32_t invited() const { return field(kInvitedShift); }
     bool caller_asleep() const { return (word & kCallerAsleep) != 0; }
+    bool held() const { return (word & kHeld) != 0; }
     bool closed() const { return (word & kClosed) != 0; }
 
    private:
@@ -87,10 +95,18 @@ class Gate {
   // over (false).
   bool wait_for_invitation();
 
-  // any_ready tells whether any worker has published blocks.
+  // hold keeps the run from ending; only while active. release_hold lets it end, and ends it if
+  // nobody is active.
+  void hold() { state_.fetch_or(kHeld, std::memory_order_seq_cst); }
+  void release_hold();
+
+  // any_ready tells whether any worker has published blocks, or something has landed.
   bool any_ready() const;
 
   std::atomic<std::uint32_t>& ready_size(std::uint32_t seat) { return sizes_[seat].value; }
+
+  // Not zero if something for workers has come from outside.
+  std::atomic<std::uint32_t>& landed() { return sizes_[seats_].value; }
 
   // Set once the run has failed or been ended: leavers do not look back then.
   void stop() { stopped_.store(true, std::memory_order_release); }
@@ -105,6 +121,7 @@ class Gate {
   static constexpr std::uint64_t kSearching = 1ULL << kSearchingShift;
   static constexpr std::uint64_t kInvited = 1ULL << kInvitedShift;
   static constexpr std::uint64_t kCallerAsleep = 1ULL << 48;
+  static constexpr std::uint64_t kHeld = 1ULL << 49;
   static constexpr std::uint64_t kClosed = 1ULL << 63;
 
   struct alignas(64) ReadySize {
@@ -112,13 +129,14 @@ class Gate {
   };
 
   bool come_back(bool caller);
+  void signal_caller();
 
   const std::uint32_t seats_;
   alignas(64) std::atomic<std::uint64_t> state_{kActive};  // the caller is at work from the start
   alignas(64) std::atomic<bool> stopped_{false};
   std::atomic<std::uint32_t> signal_{0};  // for the caller: 1 when invited or over
   std::vector<std::atomic<std::uint64_t>> free_seats_;
-  std::vector<ReadySize> sizes_;
+  std::vector<ReadySize> sizes_;  // by seat, and `landed` at the end
 };
 
 }  // namespace carpool

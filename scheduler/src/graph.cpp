@@ -13,6 +13,7 @@ namespace {
 }
 
 constexpr std::uint64_t kMostSlots = 1ULL << 26;
+constexpr std::uint32_t kMostBlockingThreads = 1024;
 
 std::string quoted(const std::string& text) {
   std::string result = "\"";
@@ -34,6 +35,11 @@ std::uint32_t Graph::add_raw_stage(StageOptions options, std::size_t item_bytes,
   }
   if (options.bins == 0 || options.block_items == 0 || options.lanes == 0) {
     refuse("stage '" + options.name + "': bins, block_items and lanes must not be zero");
+  }
+  if (options.blocking &&
+      (options.concurrency == 0 || options.concurrency > kMostBlockingThreads)) {
+    refuse("stage '" + options.name +
+           "': a blocking stage has threads of its own; set concurrency to how many, at most 1024");
   }
   if (std::uint64_t{slots_} + options.bins > kMostSlots) {
     refuse("stage '" + options.name + "': more than 2^26 bins in one graph; use coarser keys");

@@ -38,6 +38,7 @@ Layout::Layout(const Graph& graph, const RunOptions& options, std::uint32_t work
   stages.resize(graph.stages().size());
   track_age =
       options.flush.linger.count() > 0 || options.policy.kind() == Policy::Kind::oldest_first;
+  set_caps(graph, options);
   set_weights(graph);
   order_by_rank(graph);
   switch (options.policy.kind()) {
@@ -51,6 +52,21 @@ Layout::Layout(const Graph& graph, const RunOptions& options, std::uint32_t work
   }
   build_levels(graph, options);
   limit_classes();
+}
+
+void Layout::set_caps(const Graph& graph, const RunOptions& options) {
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const StageOptions& from = graph.stages()[i].options;
+    StageLayout& stage = stages[i];
+    if (from.blocking && options.mode != RunMode::serial) {
+      stage.blocking = true;
+      blocking_threads += from.concurrency;
+    } else if (!from.blocking && from.concurrency < workers) {
+      stage.cap = from.concurrency;
+    }
+    stage.gated = stage.blocking || stage.cap != 0;
+    has_exchange = has_exchange || stage.gated;
+  }
 }
 
 void Layout::set_weights(const Graph& graph) {
@@ -90,7 +106,8 @@ void Layout::set_weights(const Graph& graph) {
 }
 
 void Layout::order_by_rank(const Graph& graph) {
-  std::vector<std::uint32_t> order(stages.size());
+  std::vector<std::uint32_t>& order = stages_by_rank;
+  order.resize(stages.size());
   std::iota(order.begin(), order.end(), 0U);
   const auto rank_of = [&](std::uint32_t stage) { return graph.stages()[stage].options.rank; };
   std::stable_sort(order.begin(), order.end(),
@@ -116,7 +133,7 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
   // Small first blocks save memory where bins are many. As long as one block for every bin and
   // worker costs no more than a quarter of what the items in flight do, larger ones save copies.
   const std::uint64_t budget = std::max<std::uint64_t>(65536, in_flight * largest_item / 4);
-  const std::uint64_t thrift = budget / (std::uint64_t{slots} * workers);
+  const std::uint64_t thrift = budget / (std::uint64_t{slots} * holders());
   std::vector<std::uint32_t> sizes{kLine};  // ReadyBlocks come from the pool, too
   for (std::size_t i = 0; i < stages.size(); ++i) {
     const Graph::Stage& from = graph.stages()[i];
@@ -187,7 +204,11 @@ std::uint32_t Layout::class_of(std::uint32_t bytes) const {
 
 // The derivation is in README.md, section "Memory".
 void Layout::limit_classes() {
-  const std::uint64_t partials = std::uint64_t{workers} * kPartialsPerWorker;
+  std::uint64_t partials = std::uint64_t{workers} * kPartialsPerWorker;
+  for (const StageLayout& stage : stages) {
+    partials += stage.cap;  // one for each token
+  }
+  const std::uint64_t holders = this->holders();
   std::uint64_t shortest = kMaxCredits;
   for (const StageLayout& stage : stages) {
     shortest = std::min<std::uint64_t>(shortest, stage.block_items);
@@ -215,22 +236,20 @@ void Layout::limit_classes() {
       }
     }
     if (used) {
-      const std::uint64_t open = std::min(bins * workers + partials, in_flight / fewest);
-      // Each worker may be running one block, and be copying into another.
-      classes[c].limit = open + full + std::uint64_t{workers} * (2 + classes[c].cache);
+      const std::uint64_t open = std::min(bins * holders + partials, in_flight / fewest);
+      // Each holder may be running one block, and be copying into another.
+      classes[c].limit = open + full + holders * (2 + classes[c].cache);
     }
     if (c == node_class) {
-      classes[c].limit +=
-          partials + in_flight / shortest + std::uint64_t{workers} * (2 + classes[c].cache);
+      classes[c].limit += partials + in_flight / shortest + holders * (2 + classes[c].cache);
     }
   }
 }
 
 std::size_t Layout::table_bytes() const {
-  const std::size_t per_worker = OpenTable::bytes_for(*this) +
-                                 ReadyQueue::bytes_for(ready_lanes()) +
-                                 WorkerStats::bytes_for(stages.size(), sources.size(), slots);
-  return per_worker * workers;
+  return holders() * OpenTable::bytes_for(*this) + workers * ReadyQueue::bytes_for(ready_lanes()) +
+         (workers + blocking_threads) *
+             WorkerStats::bytes_for(stages.size(), sources.size(), slots);
 }
 
 std::size_t Layout::block_bytes() const {

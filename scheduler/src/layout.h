@@ -34,7 +34,10 @@ struct StageLayout {
   std::uint32_t bins = 0;
   std::uint32_t block_items = 0;  // after FlushOptions::count
   std::uint32_t lanes = 1;
-  std::uint32_t weight = 1;     // credits an item holds
+  std::uint32_t weight = 1;  // credits an item holds
+  std::uint32_t cap = 0;     // kernel calls at once, or tokens; zero: as many as there are workers
+  bool blocking = false;     // runs on threads of its own
+  bool gated = false;        // has a cap or blocks: its blocks go by the exchange
   std::uint32_t first_bit = 0;  // position of bin 0 in bitmaps, which are in order of rank
   std::uint32_t rank_lane = 0;  // 0 for the highest rank
   int rank = 0;
@@ -66,7 +69,12 @@ struct Layout {
   // their time.
   std::uint32_t ready_lanes() const { return 2 * lanes; }
 
+  // How many hold blocks: workers, threads of blocking stages, and the exchange.
+  std::uint32_t holders() const { return workers + blocking_threads + (has_exchange ? 1 : 0); }
+
   std::uint32_t workers;
+  std::uint32_t blocking_threads = 0;
+  bool has_exchange = false;  // is any stage gated?
   std::uint32_t slots;
   std::uint64_t in_flight;
   std::uint32_t lanes = 1;       // of the policy
@@ -81,8 +89,10 @@ struct Layout {
   std::vector<SourceLayout> sources;
   std::int64_t least_plenty = 0;  // the smallest SourceLayout::plenty
   std::vector<std::uint32_t> stage_of_bit;
+  std::vector<std::uint32_t> stages_by_rank;  // the highest first
 
  private:
+  void set_caps(const Graph& graph, const RunOptions& options);
   void set_weights(const Graph& graph);
   void order_by_rank(const Graph& graph);
   void build_levels(const Graph& graph, const RunOptions& options);

@@ -110,6 +110,37 @@ bool OpenTable::take_best(Block& block) {
   return true;
 }
 
+bool OpenTable::take_fullest(std::uint32_t stage_index, Block& block) {
+  const StageLayout& stage = layout_.stages[stage_index];
+  for (std::uint32_t grades = grades_in_use_; grades != 0;) {
+    const auto grade = static_cast<std::uint32_t>(std::bit_width(grades) - 1);
+    grades &= ~(1U << grade);
+    const std::uint32_t bit = grades_[grade].first_from(stage.first_bit);
+    if (bit >= stage.first_bit && bit - stage.first_bit < stage.bins) {
+      block = remove(bit);
+      return true;
+    }
+  }
+  return false;
+}
+
+void OpenTable::absorb(const Block& block) {
+  const StageLayout& stage = layout_.stages[block.stage];
+  detail::OpenSlot& slot = table_[stage.first_slot + block.bin];
+  const std::byte* from = block.data;
+  std::size_t left = std::size_t{block.items} * stage.item_bytes;
+  while (left != 0) {
+    if (slot.write == slot.end) {
+      make_room(block.stage, block.bin);
+    }
+    const std::size_t part = std::min(left, static_cast<std::size_t>(slot.end - slot.write));
+    std::memcpy(slot.write, from, part);
+    slot.write += part;
+    from += part;
+    left -= part;
+  }
+}
+
 std::uint32_t OpenTable::choose() {
   if (policy_.kind() == Policy::Kind::custom) {
     return choose_by_lane_function();

@@ -56,6 +56,13 @@ class OpenTable final : public Emitter {
   // take_best removes the block that should leave first. False if there is none.
   bool take_best(Block& block);
 
+  // take_fullest removes the fullest block of one stage. False if it has none.
+  bool take_fullest(std::uint32_t stage, Block& block);
+
+  // absorb appends the items of a block to the open one of its stage and bin; the memory stays the
+  // caller's.
+  void absorb(const Block& block);
+
   // take_older_than removes the oldest block if it was opened before `ticks`. Needs
   // Layout::track_age.
   bool take_older_than(std::uint64_t ticks, Block& block);

@@ -167,6 +167,11 @@ void RunReport::print(std::ostream& out) const {
   out << format("  worker time: kernels %.1f%%, sources %.1f%%, scheduler %.1f%%, idle %.1f%%\n",
                 kernel_seconds * percent, source_seconds * percent, scheduler_seconds * percent,
                 idle_seconds * percent);
+  if (!blocking_threads.empty()) {
+    const double every = seconds * static_cast<double>(blocking_threads.size());
+    out << format("  blocking stages: %zu threads, %.1f%% of the time in kernels\n",
+                  blocking_threads.size(), every > 0 ? 100 * blocking_seconds / every : 0.0);
+  }
   out << format("  memory: %.1f KiB of at most %.1f KiB; in flight: at most %llu of %llu\n",
                 static_cast<double>(peak_bytes) / 1024,
                 static_cast<double>(worst_case_bytes) / 1024, wide(peak_in_flight),
@@ -189,6 +194,7 @@ std::string RunReport::to_json(std::size_t max_bins) const {
   json.number("source_seconds", source_seconds);
   json.number("scheduler_seconds", scheduler_seconds);
   json.number("idle_seconds", idle_seconds);
+  json.number("blocking_seconds", blocking_seconds);
   json.count("peak_bytes", peak_bytes);
   json.count("worst_case_bytes", worst_case_bytes);
   json.count("peak_in_flight", peak_in_flight);
@@ -201,6 +207,8 @@ std::string RunReport::to_json(std::size_t max_bins) const {
              [&](const SourceReport& source) { write_source(out, source); });
   write_list(json.name("workers"), workers,
              [&](const WorkerReport& worker) { write_worker(out, worker); });
+  write_list(json.name("blocking_threads"), blocking_threads,
+             [&](const WorkerReport& thread) { write_worker(out, thread); });
   write_list(json.name("notes"), notes, [&](const std::string& note) { out << escaped(note); });
   json.end();
   return out.str();

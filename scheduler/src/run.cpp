@@ -9,6 +9,7 @@
 
 #include <tbb/task_arena.h>
 
+#include "blocking_crew.h"
 #include "run_core.h"
 #include "simulated_run.h"
 
@@ -159,6 +160,7 @@ class ThreadedRun final : private Summoner {
   ThreadedRun(const Graph& graph, const RunOptions& options, ArenaChoice& choice)
       : arena_(choice.arena()),
         core_(graph, options, choice.workers(), this),
+        crew_(core_),
         destination_(std::make_shared<Destination>(Destination{core_.gate, &core_})) {}
 
   RunReport run() {
@@ -178,6 +180,7 @@ class ThreadedRun final : private Summoner {
       // Outside the arena: a thread asleep in there would be missing from every nested
       // parallel_for.
     } while (core_.gate->wait_for_invitation() && core_.gate->enter());
+    crew_.dismiss();
     return core_.report();
   }
 
@@ -187,8 +190,11 @@ class ThreadedRun final : private Summoner {
     arena_.enqueue(Invitation(destination_.get()));
   }
 
+  void summon_blocking(std::uint32_t stage) override { crew_.call(stage); }
+
   tbb::task_arena& arena_;
   RunCore core_;
+  BlockingCrew crew_;
   std::shared_ptr<const Destination> destination_;
 };
 
@@ -227,6 +233,15 @@ RunReport run(const Graph& graph, const RunOptions& options) {
 
 std::uint32_t worker_count(const RunOptions& options) {
   return workers_of(options);
+}
+
+std::uint32_t worker_count(const Graph& graph, const RunOptions& options) {
+  std::uint32_t count = workers_of(options);
+  for (const auto& stage : graph.stages()) {
+    const bool has_threads = stage.options.blocking && options.mode != RunMode::serial;
+    count += has_threads ? stage.options.concurrency : 0;
+  }
+  return count;
 }
 
 std::size_t worst_case_bytes(const Graph& graph, const RunOptions& options) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "blocking_worker.h"
+#include "exchange.h"
 #include "worker.h"
 
 namespace carpool {
@@ -53,6 +55,9 @@ RunCore::RunCore(const Graph& g, const RunOptions& o, std::uint32_t worker_count
       gate(std::make_shared<Gate>(worker_count)),
       credits(o.in_flight),
       pool(layout, o.overflow),
+      exchange(layout.has_exchange
+                   ? std::make_unique<Exchange>(layout, o.policy, pool, *gate, summoner)
+                   : nullptr),
       clock(o.mode == RunMode::simulated
                 ? RunClock(o.simulation.start.value_or(std::chrono::steady_clock::now()))
                 : RunClock()),
@@ -65,6 +70,13 @@ RunCore::RunCore(const Graph& g, const RunOptions& o, std::uint32_t worker_count
       next_progress_ns_(std::chrono::nanoseconds(o.progress_every).count()) {
   for (std::uint32_t i = 0; i < worker_count; ++i) {
     workers_.push_back(std::make_unique<Worker>(*this, i));
+  }
+  for (std::uint32_t s = 0; s < layout.stages.size(); ++s) {
+    for (std::uint32_t i = 0; layout.stages[s].blocking && i < g.stages()[s].options.concurrency;
+         ++i) {
+      const auto index = worker_count + static_cast<std::uint32_t>(blocking_workers_.size());
+      blocking_workers_.push_back(std::make_unique<BlockingWorker>(*this, s, index));
+    }
   }
   options.monitor.show(*this);
 }
@@ -97,14 +109,21 @@ void RunCore::fail(std::exception_ptr exception) {
   if (!ended_.exchange(true, std::memory_order_relaxed)) {
     failure_ = std::move(exception);
   }
-  gate->stop();
+  stop();
 }
 
 void RunCore::end(Outcome outcome) {
   if (!ended_.exchange(true, std::memory_order_relaxed)) {
     outcome_ = outcome;
   }
+  stop();
+}
+
+void RunCore::stop() {
   gate->stop();
+  if (exchange) {
+    exchange->abandon();
+  }
 }
 
 bool RunCore::try_enter_source(std::uint32_t index) {
@@ -148,7 +167,20 @@ bool RunCore::source_ready() const {
   return false;
 }
 
+template <class Visit>
+void RunCore::for_each_runner(Visit visit) const {
+  for (const auto& worker : workers_) {
+    visit(worker->runner());
+  }
+  for (const auto& worker : blocking_workers_) {
+    visit(worker->runner());
+  }
+}
+
 void RunCore::maybe_report_progress() {
+  if (!options.progress) {
+    return;
+  }
   const auto now = static_cast<std::int64_t>(clock.seconds() * 1e9);
   std::int64_t due = next_progress_ns_.load(std::memory_order_relaxed);
   // Acquire and release: one call sees what the one before it wrote. The maximum keeps others out
@@ -158,10 +190,12 @@ void RunCore::maybe_report_progress() {
     return;
   }
   Progress progress{.seconds = static_cast<double>(now) * 1e-9, .batches = 0, .item_visits = 0};
-  for (const auto& worker : workers_) {
-    progress.batches += worker->stats().batches.get();
-    progress.item_visits += worker->stats().items.get();
-  }
+  for_each_runner([&](const BatchRunner& runner) {
+    for (const StageStats& stage : runner.stats().stages) {
+      progress.batches += stage.batches.get();
+      progress.item_visits += stage.items.get();
+    }
+  });
   options.progress(progress);
   next_progress_ns_.store(now + std::chrono::nanoseconds(options.progress_every).count(),
                           std::memory_order_release);
@@ -190,8 +224,8 @@ RunState RunCore::state() const {
 namespace {
 
 void add_stage(StageReport& sum, const StageStats& part, std::uint64_t& seats, double tick) {
-  sum.batches += part.batches;
-  sum.items += part.items;
+  sum.batches += part.batches.get();
+  sum.items += part.items.get();
   sum.steals += part.steals;
   sum.kernel_seconds += static_cast<double>(part.kernel_ticks) * tick;
   for (std::size_t c = 0; c < kFlushCauses; ++c) {
@@ -206,10 +240,10 @@ double ratio(std::uint64_t a, std::uint64_t b) {
 
 WorkerReport worker_report(const WorkerStats& stats, double tick) {
   WorkerReport report;
-  report.batches = stats.batches.get();
-  report.items = stats.items.get();
   report.arrivals = stats.arrivals;
   for (const StageStats& stage : stats.stages) {
+    report.batches += stage.batches.get();
+    report.items += stage.items.get();
     report.steals += stage.steals;
     report.kernel_seconds += static_cast<double>(stage.kernel_ticks) * tick;
   }
@@ -251,8 +285,8 @@ RunReport RunCore::report() {
   for (const auto& source : graph.sources()) {
     report.sources.push_back({.name = source.options.name});
   }
-  for (const auto& worker : workers_) {
-    const WorkerStats& stats = worker->stats();
+  for_each_runner([&](const BatchRunner& runner) {
+    const WorkerStats& stats = runner.stats();
     for (std::size_t s = 0; s < report.stages.size(); ++s) {
       add_stage(report.stages[s], stats.stages[s], seats[s], tick);
       for (std::uint32_t b = 0; b < report.stages[s].bins.size(); ++b) {
@@ -266,8 +300,14 @@ RunReport RunCore::report() {
       report.sources[s].items += stats.sources[s].items;
       report.sources[s].seconds += static_cast<double>(stats.sources[s].ticks) * tick;
     }
-    report.workers.push_back(worker_report(stats, tick));
-    report.peak_in_flight = std::max(report.peak_in_flight, worker->credits().peak_lent());
+    report.peak_in_flight = std::max(report.peak_in_flight, runner.credits().peak_lent());
+  });
+  for (const auto& worker : workers_) {
+    report.workers.push_back(worker_report(worker->runner().stats(), tick));
+  }
+  for (const auto& worker : blocking_workers_) {
+    report.blocking_threads.push_back(worker_report(worker->runner().stats(), tick));
+    report.blocking_seconds += report.blocking_threads.back().kernel_seconds;
   }
   for (std::size_t s = 0; s < report.stages.size(); ++s) {
     report.stages[s].run_length = ratio(report.stages[s].items, report.stages[s].batches);
@@ -288,6 +328,10 @@ RunReport RunCore::report() {
   for (const auto& worker : workers_) {
     report.dropped_items += worker->drop_all();
   }
+  for (const auto& worker : blocking_workers_) {
+    report.dropped_items += worker->dropped();
+  }
+  report.dropped_items += exchange ? exchange->items() : 0;
   add_notes(report);
   return report;
 }

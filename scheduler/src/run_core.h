@@ -16,6 +16,8 @@
 
 namespace carpool {
 
+class BlockingWorker;
+class Exchange;
 class Worker;
 
 // Summoner brings a thread to the run after Gate::invite() has booked an invitation for a helper.
@@ -25,6 +27,9 @@ class Summoner {
 
   // caller_called tells that the caller of run() has been woken instead.
   virtual void caller_called() {}
+
+  // summon_blocking brings a thread to a blocking stage for which items wait.
+  virtual void summon_blocking(std::uint32_t stage) = 0;
 
  protected:
   ~Summoner() = default;
@@ -48,8 +53,15 @@ class RunCore {
   // fail ends the run because of an exception; the first one counts.
   void fail(std::exception_ptr exception);
 
-  // end ends the run early without one.
+  // end ends the run early without one. check_end does so if cancel or deadline ask for it.
   void end(Outcome outcome);
+  void check_end() {
+    if (options.cancel.cancelled()) {
+      end(Outcome::cancelled);
+    } else if (options.deadline && clock.now() >= *options.deadline) {
+      end(Outcome::deadline);
+    }
+  }
 
   // try_enter_source takes one of the places in a source. leave_source gives it back.
   bool try_enter_source(std::uint32_t source);
@@ -62,12 +74,13 @@ class RunCore {
     return open_sources_.load(std::memory_order_relaxed) != 0 && !options.cancel.draining();
   }
 
-  void maybe_report_progress();
+  void maybe_report_progress();  // does nothing without a callback
 
   // state is for another thread, while the run is under way.
   RunState state() const;
 
   Worker& worker(std::uint32_t index) { return *workers_[index]; }
+  BlockingWorker& blocking_worker(std::uint32_t index) { return *blocking_workers_[index]; }
 
   // allowed_from returns, by stage, whether a node has declared an edge to it; null if it has
   // declared none. Nodes are stages, then sources.
@@ -75,7 +88,7 @@ class RunCore {
     return allowed_[node].empty() ? nullptr : allowed_[node].data();
   }
 
-  // report adds everything up, or rethrows. Call it when every worker has left.
+  // report adds everything up, or rethrows. Call it when every worker and thread has left.
   RunReport report();
 
   const Graph& graph;
@@ -84,6 +97,7 @@ class RunCore {
   const std::shared_ptr<Gate> gate;
   Credits credits;
   BlockPool pool;
+  const std::unique_ptr<Exchange> exchange;  // null if no stage needs one
   RunClock clock;
   const std::uint64_t linger_ticks;  // FlushOptions::linger
 
@@ -93,6 +107,9 @@ class RunCore {
     std::atomic<bool> exhausted{false};
   };
 
+  template <class Visit>
+  void for_each_runner(Visit visit) const;
+  void stop();
   Outcome outcome() const;
   void add_notes(RunReport& report) const;
 
@@ -101,6 +118,7 @@ class RunCore {
   std::vector<SourceState> sources_;
   std::atomic<std::uint32_t> open_sources_;
   std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<std::unique_ptr<BlockingWorker>> blocking_workers_;
   std::atomic<bool> ended_{false};
   Outcome outcome_ = Outcome::completed;
   std::exception_ptr failure_;

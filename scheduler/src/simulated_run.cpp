@@ -16,7 +16,11 @@ SimulatedRun::SimulatedRun(const Graph& graph, const RunOptions& options, std::u
     : settings_(options.simulation),
       core_(graph, options, workers, this),
       threads_(workers),
-      random_state_(options.simulation.seed) {}
+      random_state_(options.simulation.seed) {
+  for (std::uint32_t i = 0; i < core_.layout.blocking_threads; ++i) {
+    threads_.emplace_back().blocking = &core_.blocking_worker(i);
+  }
+}
 
 RunReport SimulatedRun::run() {
   sit_down(kCaller, false);
@@ -48,12 +52,21 @@ void SimulatedRun::step(std::uint32_t thread) {
         return schedule(thread, Next::find, settings_.choose_seconds);
       case Next::look:
         return look(thread);
+      case Next::fetch:
+        return fetch(thread);
+      case Next::block:
+        threads_[thread].blocking->perform(threads_[thread].work.virtual_ticks);
+        return fetch(thread);
       case Next::nothing:
         return;
     }
   } catch (...) {
     core_.fail(std::current_exception());
-    leave(thread);
+    if (threads_[thread].blocking != nullptr) {
+      threads_[thread].blocking->perform(0);  // drops what it has taken
+    } else {
+      leave(thread);
+    }
   }
 }
 
@@ -115,6 +128,19 @@ void SimulatedRun::leave(std::uint32_t thread) {
   }
 }
 
+// A thread of a blocking stage takes what waits, or sleeps.
+void SimulatedRun::fetch(std::uint32_t thread) {
+  Thread& self = threads_[thread];
+  self.away = !self.blocking->take();
+  if (!self.away) {
+    const double seconds =
+        jittered(batch_cost(self.blocking->stage(), self.blocking->items_taken()));
+    self.work.virtual_ticks = static_cast<std::uint64_t>(seconds * 1e9);
+    self.next = Next::block;
+    events_.push({now_ + self.work.virtual_ticks, random(), thread});
+  }
+}
+
 void SimulatedRun::schedule(std::uint32_t thread, Next next, double seconds) {
   threads_[thread].next = next;
   const auto ticks = static_cast<std::uint64_t>(jittered(seconds) * 1e9);
@@ -125,10 +151,11 @@ double SimulatedRun::cost(const Worker::Work& work) const {
   if (work.is_source) {
     return settings_.source_item_seconds * work.budget;
   }
-  if (settings_.batch_seconds) {
-    return settings_.batch_seconds(work.block.stage, work.block.items);
-  }
-  return 100e-9 + 20e-9 * work.block.items;
+  return batch_cost(work.block.stage, work.block.items);
+}
+
+double SimulatedRun::batch_cost(std::uint32_t stage, std::uint32_t items) const {
+  return settings_.batch_seconds ? settings_.batch_seconds(stage, items) : 100e-9 + 20e-9 * items;
 }
 
 std::uint64_t SimulatedRun::random() {
@@ -146,7 +173,7 @@ double SimulatedRun::jittered(double seconds) {
 
 void SimulatedRun::summon() {
   // The gate counts: when it books an invitation there is a thread that is neither here nor called.
-  const auto count = static_cast<std::uint32_t>(threads_.size());
+  const std::uint32_t count = core_.layout.workers;
   const auto first = static_cast<std::uint32_t>(random() % count);
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t thread = (first + i) % count;
@@ -157,6 +184,16 @@ void SimulatedRun::summon() {
     }
   }
   throw std::logic_error("carpool: the gate invited more helpers than there are");
+}
+
+void SimulatedRun::summon_blocking(std::uint32_t stage) {
+  for (std::uint32_t thread = core_.layout.workers; thread < threads_.size(); ++thread) {
+    if (threads_[thread].away && threads_[thread].blocking->stage() == stage) {
+      threads_[thread].away = false;
+      schedule(thread, Next::fetch, settings_.wake_seconds);
+      return;
+    }
+  }
 }
 
 void SimulatedRun::caller_called() {

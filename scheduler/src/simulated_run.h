@@ -6,6 +6,7 @@
 #include <queue>
 #include <vector>
 
+#include "blocking_worker.h"
 #include "run_core.h"
 #include "worker.h"
 
@@ -23,11 +24,12 @@ class SimulatedRun final : private Summoner {
 
  private:
   // What a virtual thread does at its next event.
-  enum class Next { nothing, arrive, find, perform, look };
+  enum class Next { nothing, arrive, find, perform, look, fetch, block };
 
   struct Thread {
     Next next = Next::nothing;
-    bool away = true;  // neither at work nor on the way
+    bool away = true;                    // neither at work nor on the way
+    BlockingWorker* blocking = nullptr;  // set for a thread of a blocking stage, which has no seat
     std::uint32_t seat = 0;
     Worker::Work work;
   };
@@ -48,17 +50,21 @@ class SimulatedRun final : private Summoner {
   void look(std::uint32_t thread);
   void leave(std::uint32_t thread);
 
+  void fetch(std::uint32_t thread);
+
   void schedule(std::uint32_t thread, Next next, double seconds);
   double cost(const Worker::Work& work) const;
+  double batch_cost(std::uint32_t stage, std::uint32_t items) const;
   std::uint64_t random();
   double jittered(double seconds);
 
   void summon() override;
   void caller_called() override;
+  void summon_blocking(std::uint32_t stage) override;
 
   const Simulation& settings_;
   RunCore core_;
-  std::vector<Thread> threads_;  // the caller first
+  std::vector<Thread> threads_;  // the caller first, those of blocking stages last
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   std::uint64_t now_ = 0;
   std::uint64_t random_state_;

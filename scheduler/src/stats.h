@@ -25,8 +25,8 @@ class Counter {
 };
 
 struct StageStats {
-  std::uint64_t batches = 0;
-  std::uint64_t items = 0;
+  Counter batches;
+  Counter items;
   std::uint64_t seats = 0;  // lanes offered
   std::uint64_t steals = 0;
   std::uint64_t kernel_ticks = 0;
@@ -50,8 +50,6 @@ struct WorkerStats {
   std::vector<StageStats> stages;
   std::vector<SourceStats> sources;
   std::vector<BinReport> bins;
-  Counter batches;
-  Counter items;
   Counter doing;  // an Activity, or that plus the number of a stage or, after those, a source
   std::uint64_t arrivals = 0;
   std::uint64_t present_ticks = 0;

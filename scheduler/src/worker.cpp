@@ -11,12 +11,8 @@
 namespace carpool {
 namespace {
 
-// Batches shorter than this are timed one in eight: reading the clock twice costs as much as some
-// items do.
-constexpr std::uint32_t kTinyBatch = 32;
-constexpr std::uint32_t kTinySample = 8;
-constexpr std::uint64_t kSlowBatchTicks = 4'000;
-constexpr std::uint64_t kInterruptedTicks = 100'000;
+// A thief takes as many tiny blocks as make this many items.
+constexpr std::uint32_t kWorthStealing = 32;
 
 // How long a worker without work looks around before it leaves, and how long an owner waits after
 // sharing in vain: about the cost of an invitation. In ticks; at 1 to 4 GHz some 5 to 20
@@ -31,15 +27,14 @@ Worker::Worker(RunCore& core, std::uint32_t index)
     : core_(core),
       layout_(core.layout),
       gate_(*core.gate),
+      exchange_(core.exchange.get()),
       index_(index),
       newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
-      always_timed_(core.options.deadline || core.linger_ticks != 0 || core.options.progress ||
-                    core.clock.is_virtual()),
-      cache_(core.pool, core.layout),
-      credits_(core.credits, core.layout.workers),
+      plain_(exchange_ == nullptr),
+      has_chores_(core.options.progress || core.linger_ticks != 0 ||
+                  core.layout.blocking_threads != 0),
+      runner_(core, index, *this),
       ready_(core.layout.ready_lanes(), core.gate->ready_size(index)),
-      open_(core.layout, core.options.policy, cache_, *this),
-      stats_(core.layout.stages.size(), core.graph.sources().size(), core.layout.slots),
       next_victim_(index + 1),
       next_source_(index),
       share_pause_(kFirstSharePause),
@@ -64,11 +59,12 @@ void Worker::serve(bool searching) {
 }
 
 void Worker::begin_shift(bool searching) {
-  came_ = now_ = search_began_ = core_.clock.ticks();
+  came_ = search_began_ = core_.clock.ticks();
+  runner_.set_now(came_);
   searching_ = searching;
-  stats_.doing.set(searching ? kSearching : kBetweenBatches);
-  ++stats_.arrivals;
-  check_end();
+  runner_.stats().doing.set(searching ? kSearching : kBetweenBatches);
+  ++runner_.stats().arrivals;
+  core_.check_end();
 }
 
 bool Worker::find(Work& work) {
@@ -82,61 +78,41 @@ bool Worker::find(Work& work) {
 }
 
 void Worker::end_shift() {
-  credits_.return_all();
+  runner_.credits().return_all();
   const std::uint64_t left = core_.clock.ticks();
   if (searching_) {
-    stats_.search_ticks += left - search_began_;
+    runner_.stats().search_ticks += left - search_began_;
   } else {
     gate_.begin_search();  // leave() expects it
   }
-  stats_.present_ticks += left - came_;
-  stats_.doing.set(kAway);
+  runner_.stats().present_ticks += left - came_;
+  runner_.stats().doing.set(kAway);
 }
 
 RunState::Worker Worker::state() const {
-  const std::uint64_t doing = stats_.doing.get();
-  const auto name = [&]() -> std::string {
-    switch (doing) {
-      case kAway:
-        return "away";
-      case kSearching:
-        return "searching";
-      case kBetweenBatches:
-        return "between batches";
-      default:
-        break;
-    }
-    const std::uint64_t node = doing - kInNode;
-    const auto& stages = core_.graph.stages();
-    return node < stages.size()
-               ? "in stage " + stages[node].options.name
-               : "in source " + core_.graph.sources()[node - stages.size()].options.name;
-  };
-  return {.doing = name(),
-          .ready_blocks = ready_.size(),
-          .ready_partial = ready_.partials(),
-          .open_blocks = open_.count(),
-          .batches = stats_.batches.get(),
-          .items = stats_.items.get()};
+  RunState::Worker state = runner_.state();
+  state.ready_blocks = ready_.size();
+  state.ready_partial = ready_.partials();
+  return state;
 }
 
 // The order of the whole scheduler is here: what is ready; then new items while credits are plenty,
-// which keeps this worker on its own data; then what others have ready; then partial blocks, last
-// of all those that have been offered to others, who need time to come; and new items once more,
-// one by one if need be.
+// which keeps this worker on its own data (but before them, what threads outside have emitted);
+// then what others have ready; then partial blocks, last of all those that have been offered to
+// others, who need time to come; and new items once more, one by one if need be.
 bool Worker::acquire(Work& work) {
   return take_ready(work, offers_stand() ? layout_.lanes : layout_.ready_lanes()) ||
-         take_source(work, false) || steal(work) || take_open(work) ||
-         take_ready(work, layout_.ready_lanes()) || take_source(work, true);
+         (!plain_ && take_landed(work)) || take_source(work, false) || steal(work) ||
+         take_open(work) || take_ready(work, layout_.ready_lanes()) || take_source(work, true);
 }
 
 // An offer stands for a while, and longer if somebody is on the way. Not for ever: an arena may be
 // too busy to send anybody.
 bool Worker::offers_stand() const {
-  if (ready_.partials() == 0 || now_ < share_after_) {
+  if (ready_.partials() == 0 || runner_.now() < share_after_) {
     return true;  // in the first case there is nothing to take back anyway
   }
-  return gate_.relaxed_view().invited() != 0 && now_ < share_after_ + kLongestSharePause;
+  return gate_.relaxed_view().invited() != 0 && runner_.now() < share_after_ + kLongestSharePause;
 }
 
 bool Worker::take_ready(Work& work, std::uint32_t end_lane) {
@@ -154,11 +130,11 @@ void Worker::unpack(ReadyBlock* ready, Work& work) {
   work.cause = ready->cause;
   work.is_source = false;
   work.stolen = false;
-  cache_.release(layout_.node_class, reinterpret_cast<std::byte*>(ready));
+  runner_.cache().release(layout_.node_class, reinterpret_cast<std::byte*>(ready));
 }
 
 bool Worker::take_source(Work& work, bool last_resort) {
-  const std::int64_t credits = credits_.pocket() + core_.credits.available();
+  const std::int64_t credits = runner_.credits().pocket() + core_.credits.available();
   if ((!last_resort && credits < layout_.least_plenty) || !core_.sources_open()) {
     return false;
   }
@@ -170,7 +146,7 @@ bool Worker::take_source(Work& work, bool last_resort) {
     if (credits < least || !core_.try_enter_source(index)) {
       continue;
     }
-    const std::int64_t got = credits_.reserve(least, source.burst * source.charge);
+    const std::int64_t got = runner_.credits().reserve(least, source.burst * source.charge);
     if (got == 0) {
       core_.leave_source(index, false);
       continue;
@@ -186,24 +162,28 @@ bool Worker::take_source(Work& work, bool last_resort) {
 
 bool Worker::steal(Work& work) {
   const std::uint32_t workers = layout_.workers;
-  for (std::uint32_t i = 0; i < workers; ++i) {
-    const std::uint32_t victim = (next_victim_ + i) % workers;
+  if (workers == 1) {
+    return false;
+  }
+  std::uint32_t victim = next_victim_;
+  for (std::uint32_t i = 0; i < workers; ++i, ++victim) {
+    victim = victim < workers ? victim : 0;
     if (victim == index_) {
       continue;
     }
     ReadyQueue& queue = core_.worker(victim).ready_;
-    ReadyBlock* list = queue.steal(kTinyBatch);
+    ReadyBlock* list = queue.steal(kWorthStealing);
     if (list == nullptr) {
       continue;
     }
     next_victim_ = victim;
     ReadyBlock* rest = list->newer;
-    ++stats_.stages[list->block.stage].steals;
+    ++runner_.stats().stages[list->block.stage].steals;
     unpack(list, work);
     work.stolen = true;
     while (rest != nullptr) {
       ReadyBlock* next = rest->newer;
-      ++stats_.stages[rest->block.stage].steals;
+      ++runner_.stats().stages[rest->block.stage].steals;
       ready_.push(rest);
       rest = next;
     }
@@ -216,89 +196,58 @@ bool Worker::take_open(Work& work) {
   work.cause = FlushCause::idle;
   work.is_source = false;
   work.stolen = false;
-  return open_.take_best(work.block);
+  return plain_ ? runner_.open().take_best(work.block) : take_open_that_leaves_freely(work);
+}
+
+bool Worker::take_open_that_leaves_freely(Work& work) {
+  while (runner_.open().take_best(work.block)) {
+    if (leaves_freely(work.block, work.cause)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// False if the exchange has kept the block.
+bool Worker::leaves_freely(const Block& block, FlushCause cause) {
+  return !layout_.stages[block.stage].gated || exchange_->admit(block, cause);
+}
+
+bool Worker::take_landed(Work& work) {
+  if (!exchange_->take_landed(work.block, work.cause)) {
+    return false;
+  }
+  work.is_source = false;
+  work.stolen = true;
+  ++runner_.stats().stages[work.block.stage].steals;
+  return true;
 }
 
 void Worker::perform(const Work& work) {
   if (work.is_source) {
-    call_source(work);
+    runner_.call_source(work.source, work.budget, work.virtual_ticks);
   } else {
-    run_batch(work);
+    runner_.run(work.block, work.cause, work.virtual_ticks);
+    if (!plain_ && layout_.stages[work.block.stage].cap != 0) {
+      pass_token_on(work.block.stage);
+    }
   }
-  stats_.doing.set(kBetweenBatches);
+  runner_.stats().doing.set(kBetweenBatches);
   after_call();
 }
 
-void Worker::run_batch(const Work& work) {
-  const Block& block = work.block;
-  const bool tiny = block.items < kTinyBatch && !always_timed_ && !stats_.stages[block.stage].slow;
-  const bool timed = !tiny || ++tiny_batches_ >= kTinySample;
-  const std::uint64_t began = timed ? core_.clock.ticks() : 0;
-  stats_.doing.set(kInNode + block.stage);
-  open_.begin_kernel(block.stage, core_.allowed_from(block.stage));
-  core_.graph.stages()[block.stage].kernel(
-      {.data = block.data, .items = block.items, .bin = block.bin, .worker = index_}, open_);
-  std::uint64_t ticks = 0;
-  if (timed) {
-    now_ = core_.clock.ticks();
-    ticks = now_ - began + work.virtual_ticks;
-    stats_.stages[block.stage].slow = ticks > kSlowBatchTicks;
-    if (tiny) {
-      // A sample stands for those that were not timed, but not if the system took the core away.
-      ticks *= ticks < kInterruptedTicks ? tiny_batches_ : 1;
-      tiny_batches_ = 0;
-    }
+void Worker::pass_token_on(std::uint32_t stage) {
+  Block block;
+  FlushCause cause;
+  if (exchange_->pass_on(stage, block, cause)) {
+    push_ready(block, cause);
   }
-  count_batch(work, ticks);
-  const StageLayout& stage = layout_.stages[block.stage];
-  credits_.settle(open_.take_spent(), std::int64_t{stage.weight} * block.items);
-  cache_.release(stage.levels[block.level].pool_class, block.data);
-}
-
-void Worker::count_batch(const Work& work, std::uint64_t ticks) {
-  const Block& block = work.block;
-  StageStats& stage = stats_.stages[block.stage];
-  const std::uint32_t lanes = layout_.stages[block.stage].lanes;
-  ++stage.batches;
-  stage.items += block.items;
-  stage.seats += lanes == 1 ? block.items : (block.items + lanes - 1) / lanes * lanes;
-  stage.kernel_ticks += ticks;
-  ++stage.causes[static_cast<std::size_t>(work.cause)];
-  BinReport& bin = stats_.bins[layout_.stages[block.stage].first_slot + block.bin];
-  ++bin.batches;
-  bin.items += block.items;
-  stats_.batches.add(1);
-  stats_.items.add(block.items);
-}
-
-void Worker::call_source(const Work& work) {
-  const std::uint64_t began = core_.clock.ticks();
-  SourceContext context{.worker = index_, .budget = work.budget};
-  const auto node = static_cast<std::uint32_t>(layout_.stages.size()) + work.source;
-  stats_.doing.set(kInNode + node);
-  open_.set_time(began);
-  open_.begin_source(node, core_.allowed_from(node));
-  const SourceStatus status = core_.graph.sources()[work.source].function(context, open_);
-  if (open_.emitted_items() > work.budget) {
-    throw std::logic_error("carpool: source '" + core_.graph.sources()[work.source].options.name +
-                           "' emitted more items than its budget allowed");
-  }
-  credits_.settle(open_.take_spent(), 0);
-  core_.leave_source(work.source, status == SourceStatus::exhausted);
-  now_ = core_.clock.ticks();
-  SourceStats& source = stats_.sources[work.source];
-  ++source.calls;
-  source.items += open_.emitted_items();
-  source.ticks += now_ - began + work.virtual_ticks;
 }
 
 void Worker::after_call() {
-  check_end();
-  if (core_.options.progress) {
-    core_.maybe_report_progress();
-  }
-  if (linger_ticks_ != 0) {
-    flush_lingering();
+  core_.check_end();
+  if (has_chores_) {
+    do_chores();
   }
   const Gate::View seen =
       gate_.relaxed_view();  // relaxed: a hint, and looked at again after every call
@@ -307,19 +256,33 @@ void Worker::after_call() {
   }
 }
 
-void Worker::check_end() {
-  if (core_.options.cancel.cancelled()) {
-    core_.end(Outcome::cancelled);
-  } else if (core_.options.deadline && core_.clock.now() >= *core_.options.deadline) {
-    core_.end(Outcome::deadline);
+void Worker::do_chores() {
+  core_.maybe_report_progress();
+  if (linger_ticks_ != 0) {
+    flush_lingering();
+  }
+  if (layout_.blocking_threads != 0) {
+    feed_blocking_stages();
+  }
+}
+
+// Threads that block have nothing else to do than what they are given: they need not wait until
+// blocks are full.
+void Worker::feed_blocking_stages() {
+  Block block;
+  for (std::uint32_t stage = 0; stage < layout_.stages.size(); ++stage) {
+    while (layout_.stages[stage].blocking && exchange_->waiting(stage) == 0 &&
+           runner_.open().take_fullest(stage, block)) {
+      publish(block, FlushCause::asked);
+    }
   }
 }
 
 void Worker::flush_lingering() {
-  open_.set_time(now_);
+  runner_.open().set_time(runner_.now());
   Block block;
-  while (ready_.partials() < kPartialsPerWorker && now_ > linger_ticks_ &&
-         open_.take_older_than(now_ - linger_ticks_, block)) {
+  while (ready_.partials() < kPartialsPerWorker && runner_.now() > linger_ticks_ &&
+         runner_.open().take_older_than(runner_.now() - linger_ticks_, block)) {
     publish(block, FlushCause::linger);
   }
 }
@@ -328,14 +291,14 @@ void Worker::flush_lingering() {
 // published to take, or they did not come for what they were offered last time: moving a few tiny
 // items costs more than handling them here.
 void Worker::share() {
-  if (ready_.size() == 0 && core_.options.flush.idle && now_ >= share_after_) {
+  if (ready_.size() == 0 && core_.options.flush.idle && runner_.now() >= share_after_) {
     const bool in_vain = shared_ != 0 && taken_back_ >= shared_;
     share_pause_ = in_vain ? std::min(share_pause_ * 2, kLongestSharePause) : kFirstSharePause;
-    share_after_ = now_ + share_pause_;
+    share_after_ = runner_.now() + share_pause_;
     shared_ = taken_back_ = 0;
-    const std::uint32_t count = std::min(open_.count() / 2, kPartialsPerWorker);
+    const std::uint32_t count = std::min(runner_.open().count() / 2, kPartialsPerWorker);
     Block block;
-    for (std::uint32_t i = 0; i < count && open_.take_best(block); ++i) {
+    for (std::uint32_t i = 0; i < count && runner_.open().take_best(block); ++i) {
       publish(block, FlushCause::asked);
       ++shared_;
     }
@@ -347,8 +310,14 @@ void Worker::share() {
 void Worker::publish(const Block& block, FlushCause cause) {
   // Before others can retire these items: what they give back must have been taken, or a source
   // would find credits that nobody has given back yet.
-  credits_.settle(open_.take_spent(), 0);
-  auto* ready = ::new (cache_.allocate(layout_.node_class)) ReadyBlock;
+  runner_.credits().settle(runner_.open().take_spent(), 0);
+  if (plain_ || leaves_freely(block, cause)) {
+    push_ready(block, cause);
+  }
+}
+
+void Worker::push_ready(const Block& block, FlushCause cause) {
+  auto* ready = ::new (runner_.cache().allocate(layout_.node_class)) ReadyBlock;
   ready->block = block;
   ready->cause = cause;
   ready->partial = cause != FlushCause::full && cause != FlushCause::count;
@@ -399,10 +368,13 @@ bool Worker::search() {
 }
 
 bool Worker::begin_search() {
-  credits_.return_all();  // before looking at the sources: see Gate
+  runner_.credits().return_all();  // before looking at the sources: see Gate
+  if (exchange_ != nullptr) {
+    exchange_->take_errand();  // which is to look at the sources
+  }
   if (!searching_) {
     searching_ = true;
-    stats_.doing.set(kSearching);
+    runner_.stats().doing.set(kSearching);
     search_began_ = core_.clock.ticks();
     gate_.begin_search();
   }
@@ -422,7 +394,7 @@ bool Worker::sees_work() const {
 
 void Worker::found_work() {
   searching_ = false;
-  stats_.search_ticks += core_.clock.ticks() - search_began_;
+  runner_.stats().search_ticks += core_.clock.ticks() - search_began_;
   // Others kept quiet while somebody was searching. If that was the last searcher and there is
   // more, call the next.
   if (gate_.hungry(gate_.end_search()) && gate_.any_ready()) {
@@ -431,7 +403,7 @@ void Worker::found_work() {
 }
 
 std::uint64_t Worker::drop_all() {
-  std::uint64_t items = open_.drop_all();
+  std::uint64_t items = runner_.open().drop_all();
   while (const ReadyBlock* ready = ready_.take(true, layout_.ready_lanes())) {
     items += ready->block.items;
   }

@@ -3,12 +3,10 @@
 
 #include <cstdint>
 
-#include "block_pool.h"
-#include "credits.h"
-#include "open_table.h"
+#include "batch_runner.h"
+#include "exchange.h"
 #include "ready_queue.h"
 #include "run_core.h"
-#include "stats.h"
 
 namespace carpool {
 
@@ -21,9 +19,7 @@ class Worker final : private BlockSink {
   // serve works until there is nothing left to do, or the run was ended.
   void serve(bool searching);
 
-  WorkerStats& stats() { return stats_; }
-  const WorkerStats& stats() const { return stats_; }
-  const CreditCache& credits() const { return credits_; }
+  const BatchRunner& runner() const { return runner_; }
 
   // state is for other threads, at any time.
   RunState::Worker state() const;
@@ -60,39 +56,39 @@ class Worker final : private BlockSink {
   bool take_source(Work& work, bool last_resort);
   bool steal(Work& work);
   bool take_open(Work& work);
+  bool take_landed(Work& work);
+  bool take_open_that_leaves_freely(Work& work);
+  bool leaves_freely(const Block& block, FlushCause cause);
   void unpack(ReadyBlock* ready, Work& work);
 
-  void run_batch(const Work& work);
-  void call_source(const Work& work);
-  void count_batch(const Work& work, std::uint64_t ticks);
+  void pass_token_on(std::uint32_t stage);
   void after_call();
-  void check_end();
+  void do_chores();
   void flush_lingering();
+  void feed_blocking_stages();
   void share();
 
   bool search();
   void found_work();
 
   void publish(const Block& block, FlushCause cause) override;
+  void push_ready(const Block& block, FlushCause cause);
   std::uint32_t lane_of(const Block& block) const;
 
   RunCore& core_;
   const Layout& layout_;
   Gate& gate_;
+  Exchange* const exchange_;  // null if no stage needs one
   const std::uint32_t index_;
   const bool newest_first_;
-  const bool always_timed_;
-  BlockCache cache_;
-  CreditCache credits_;
+  const bool plain_;       // a block that leaves the open table needs no more thought
+  const bool has_chores_;  // is there anything to do between batches?
+  BatchRunner runner_;
   ReadyQueue ready_;
-  OpenTable open_;
-  WorkerStats stats_;
 
   bool searching_ = false;
-  std::uint32_t tiny_batches_ = 0;  // since the last timed one
   std::uint32_t next_victim_ = 0;
   std::uint32_t next_source_ = 0;
-  std::uint64_t now_ = 0;          // ticks at the end of the last timed call
   std::uint64_t share_after_ = 0;  // do not share before
   std::uint64_t share_pause_ = 0;  // ticks; doubles when sharing was in vain
   std::uint32_t shared_ = 0;       // blocks offered when it last shared

@@ -20,6 +20,7 @@ void check(const Shape& shape, const carpool::RunOptions& options) {
   const carpool::RunReport report = carpool::run(random.graph(), options);
   random.forbid_calls();
   EXPECT_EQ(random.counted(), random.expected()) << "seed " << shape.seed;
+  EXPECT_TRUE(random.caps_held()) << "seed " << shape.seed;
   EXPECT_EQ(report.outcome, carpool::Outcome::completed);
   EXPECT_LE(report.peak_bytes, report.worst_case_bytes) << "seed " << shape.seed;
   EXPECT_EQ(report.worst_case_bytes, carpool::worst_case_bytes(random.graph(), options));

@@ -32,7 +32,9 @@ TEST(SimulationTest, ThousandsOfInterleavingsHandleEveryItemOnce) {
                       .items = 100,
                       .most_hops = 5,
                       .fan_out = (dice >> 24) % 2 == 0 ? 1U : 4U,
-                      .split_early = (dice >> 32) % 2 == 0};
+                      .split_early = (dice >> 32) % 2 == 0,
+                      .caps = (dice >> 36) % 2 == 0,
+                      .blocking = (dice >> 38) % 2 == 0};
     RandomGraph random(shape);
     auto options = simulated(static_cast<std::uint32_t>(1 + (dice >> 40) % 9), seed);
     options.in_flight = 4 + (dice >> 48) % 200;
@@ -41,12 +43,13 @@ TEST(SimulationTest, ThousandsOfInterleavingsHandleEveryItemOnce) {
     const auto report = carpool::run(random.graph(), options);
     ASSERT_EQ(random.counted(), random.expected()) << "seed " << seed;
     ASSERT_LE(report.peak_bytes, report.worst_case_bytes) << "seed " << seed;
+    ASSERT_TRUE(random.caps_held()) << "seed " << seed;
   }
 }
 
 // What ran where and when, in order.
 std::string history(std::uint64_t seed) {
-  RandomGraph random({.seed = 3, .items = 3000, .uneven = true});
+  RandomGraph random({.seed = 3, .items = 3000, .uneven = true, .caps = true, .blocking = true});
   const auto report = carpool::run(random.graph(), simulated(7, seed));
   return report.to_json();
 }
@@ -59,7 +62,8 @@ TEST(SimulationTest, OneSeedIsOneRun) {
 
 TEST(SimulationTest, ExceptionsAndCancelEndIt) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
-    RandomGraph random({.seed = seed, .items = 2000});
+    const Shape shape{.seed = seed, .items = 2000, .caps = true, .blocking = seed % 2 == 0};
+    RandomGraph random(shape);
     std::uint64_t left = mix(seed) % 100;
     random.on_batch = [&] {
       if (left-- == 0) {
@@ -68,7 +72,7 @@ TEST(SimulationTest, ExceptionsAndCancelEndIt) {
     };
     EXPECT_THROW(carpool::run(random.graph(), simulated(5, seed)), std::uint64_t);
 
-    RandomGraph second({.seed = seed, .items = 2000});
+    RandomGraph second(shape);
     auto options = simulated(5, seed);
     options.cancel = carpool::CancelToken();
     left = mix(seed) % 100;

@@ -9,7 +9,7 @@ namespace carpool_test {
 
 namespace {
 
-constexpr std::size_t kMostWorkers = 256;
+constexpr std::size_t kMostWorkers = 512;
 
 void compute(std::uint64_t seed, int rounds) {
   for (int i = 0; i < rounds; ++i) {
@@ -18,30 +18,40 @@ void compute(std::uint64_t seed, int rounds) {
   asm volatile("" : "+r"(seed));  // keeps the loop
 }
 
+// Inside counts a call for as long as it lasts.
+class Inside {
+ public:
+  explicit Inside(std::atomic<std::uint32_t>& calls) : calls_(calls), count_(++calls) {}
+  ~Inside() { --calls_; }
+  Inside(const Inside&) = delete;
+  Inside& operator=(const Inside&) = delete;
+  std::uint32_t count() const { return count_; }
+
+ private:
+  std::atomic<std::uint32_t>& calls_;
+  const std::uint32_t count_;
+};
+
 }  // namespace
 
 RandomGraph::RandomGraph(const Shape& shape)
     : shape_(shape),
+      inside_(std::make_unique<std::atomic<std::uint32_t>[]>(shape.stages)),
       next_(std::make_unique<std::atomic<std::uint64_t>[]>(shape.sources)),
       counts_(kMostWorkers) {
   shape_.explicit_weights = shape.explicit_weights && shape.stages > 1;
   shape_.ping_pong = shape.ping_pong && shape.stages > 1;
   for (std::uint32_t s = 0; s < shape.stages; ++s) {
-    const std::uint64_t dice = mix(shape.seed * 1000 + s);
-    const auto bins = static_cast<std::uint32_t>(1 + dice % shape.most_bins);
-    const bool narrow = shape_.explicit_weights && s + 1 == shape.stages;
-    bins_.push_back(bins);
-    stages_.push_back(graph_.add_stage<Item>({.name = std::string("s").append(std::to_string(s)),
-                                              .bins = bins,
-                                              .block_items = shape.block_items,
-                                              .lanes = 8,
-                                              .rank = static_cast<int>(dice >> 32 & 3),
-                                              .weight = narrow ? 1U : 0U}));
+    const carpool::StageOptions options = options_of(s);
+    bins_.push_back(options.bins);
+    most_inside_.push_back(options.concurrency);
+    stages_.push_back(graph_.add_stage<Item>(options));
   }
   for (const auto stage : stages_) {
-    graph_.set_kernel(stage, [this](const carpool::Batch<Item>& batch, carpool::Emitter& out) {
-      work(batch, out);
-    });
+    graph_.set_kernel(stage,
+                      [this, stage](const carpool::Batch<Item>& batch, carpool::Emitter& out) {
+                        work(stage.index(), batch, out);
+                      });
     for (const auto to : stages_) {
       graph_.add_edge(stage, to);
     }
@@ -59,6 +69,21 @@ RandomGraph::RandomGraph(const Shape& shape)
       graph_.add_edge(source, to);
     }
   }
+}
+
+carpool::StageOptions RandomGraph::options_of(std::uint32_t stage) const {
+  const std::uint64_t dice = mix(shape_.seed * 1000 + stage);
+  const bool narrow = shape_.explicit_weights && stage + 1 == shape_.stages;
+  const bool blocking = shape_.blocking && (dice >> 40) % 2 == 0;
+  const bool capped = blocking || (shape_.caps && (dice >> 44) % 2 == 0);
+  return {.name = std::string("s").append(std::to_string(stage)),
+          .bins = static_cast<std::uint32_t>(1 + dice % shape_.most_bins),
+          .block_items = shape_.block_items,
+          .lanes = 8,
+          .rank = static_cast<int>(dice >> 32 & 3),
+          .weight = narrow ? 1U : 0U,
+          .concurrency = capped ? static_cast<std::uint32_t>(1 + (dice >> 48) % 3) : 0U,
+          .blocking = blocking};
 }
 
 RandomGraph::Item RandomGraph::root(std::uint32_t source, std::uint64_t index) const {
@@ -103,9 +128,14 @@ void RandomGraph::successors(const Item& item, Emit emit) const {
   }
 }
 
-void RandomGraph::work(const carpool::Batch<Item>& batch, carpool::Emitter& out) {
+void RandomGraph::work(std::uint32_t stage, const carpool::Batch<Item>& batch,
+                       carpool::Emitter& out) {
   if (over_.load()) {
     late_.fetch_add(1);
+  }
+  const Inside inside(inside_[stage]);
+  if (most_inside_[stage] != 0 && inside.count() > most_inside_[stage]) {
+    crowded_ = true;
   }
   if (on_batch) {
     on_batch();

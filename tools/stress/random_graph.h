@@ -36,6 +36,8 @@ struct Shape {
   bool ping_pong = false;         // items go back and forth between the first two stages
   bool split_early = false;       // fan out as much and as soon as possible
   bool explicit_weights = false;  // the last stage never splits, and says so
+  bool caps = false;              // some stages allow few calls at once
+  bool blocking = false;          // some stages block, on one to three threads of their own
 };
 
 // Tally is what is compared: how many visits, and a sum over all of them that depends on every
@@ -52,9 +54,10 @@ class RandomGraph {
   explicit RandomGraph(const Shape& shape);
 
   carpool::Graph& graph() { return graph_; }
-  Tally counted() const;                      // what the kernels saw; call it after the run
-  Tally expected() const;                     // what they must have seen in a whole run
-  Tally admitted() const;                     // the part of it that the sources have let in
+  Tally counted() const;   // what the kernels saw; call it after the run
+  Tally expected() const;  // what they must have seen in a whole run
+  Tally admitted() const;  // the part of it that the sources have let in
+  bool caps_held() const { return !crowded_.load(); }
   void forbid_calls() { over_.store(true); }  // from now on every kernel call is a mistake
   std::uint64_t late_calls() const { return late_.load(); }
 
@@ -84,7 +87,8 @@ class RandomGraph {
   void add_to(Tally& tally, const Item& item) const;
   Tally tally_of_first(const std::function<std::uint64_t(std::uint32_t)>& items) const;
   void take_time(const Item& item) const;
-  void work(const carpool::Batch<Item>& batch, carpool::Emitter& out);
+  carpool::StageOptions options_of(std::uint32_t stage) const;
+  void work(std::uint32_t stage, const carpool::Batch<Item>& batch, carpool::Emitter& out);
   carpool::SourceStatus produce(std::uint32_t source, carpool::SourceContext& ctx,
                                 carpool::Emitter& out);
 
@@ -92,9 +96,12 @@ class RandomGraph {
   carpool::Graph graph_;
   std::vector<carpool::StageHandle<Item>> stages_;
   std::vector<std::uint32_t> bins_;
+  std::vector<std::uint32_t> most_inside_;  // by stage: kernel calls at once; zero: any number
+  std::unique_ptr<std::atomic<std::uint32_t>[]> inside_;
   std::unique_ptr<std::atomic<std::uint64_t>[]> next_;
   std::vector<Count> counts_;
   std::atomic<bool> over_{false};
+  std::atomic<bool> crowded_{false};  // more calls of a stage at once than it allows
   std::atomic<std::uint64_t> late_{0};
 };
 

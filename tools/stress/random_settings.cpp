@@ -42,7 +42,9 @@ Shape random_shape(std::uint64_t seed) {
           .sleeping = dice(14, 20) == 0,
           .ping_pong = dice(15, 8) == 0,
           .split_early = dice(11, 2) == 0,
-          .explicit_weights = dice(12, 2) == 0};
+          .explicit_weights = dice(12, 2) == 0,
+          .caps = dice(13, 3) == 0,
+          .blocking = dice(14, 4) == 0};
 }
 
 carpool::RunOptions random_options(std::uint64_t seed, std::uint32_t threads) {

@@ -272,10 +272,12 @@ void Trial::check() {
     check_memory();
   }
   require((exception_ != nullptr) == (thrown_ > 0), "an exception got lost");
+  require(random_.caps_held(), "more calls of a stage at once than its cap allows");
   findings_.visits = random_.counted().visits;
   findings_.late_batches = late_batches_;
   // Each worker may have begun one call since it last looked, and looks after that.
-  require(late_batches_ <= options_.threads, "more than one call per worker began after a cancel");
+  require(late_batches_ <= carpool::worker_count(random_.graph(), options_),
+          "more than one call per worker began after a cancel");
   require(findings_.idle_cpu_share <= 0.05, "workers without work used more than 5 % of a core");
 }
 
@@ -325,7 +327,8 @@ void Trial::check_memory() {
   }
   // The formula is about blocks and tables; the rest is the report, the arena and the workers'
   // fixed parts.
-  const double rest = 65536 + 4096.0 * options_.threads + 32.0 * random_.graph().slots();
+  const double rest = 65536 + 4096.0 * carpool::worker_count(random_.graph(), options_) +
+                      32.0 * random_.graph().slots();
   findings_.measured_share = static_cast<double>(measured_bytes_) / (formula + rest);
   require(findings_.measured_share <= 1, "measured memory above the formula");
 }

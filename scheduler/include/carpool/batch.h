@@ -18,7 +18,7 @@ struct Batch {
   std::span<const T> items;  ///< The items; all of bin `bin`.
   std::uint32_t bin = 0;     ///< Which bin of the stage they were emitted to.
   std::uint32_t worker =
-      0;  ///< Who runs the kernel: dense, below the run's workers, held by one call at a time.
+      0;  ///< Who runs the kernel: dense, below worker_count(), held by one call at a time.
 };
 
 }  // namespace carpool

@@ -29,6 +29,18 @@ struct StageOptions {
   /// become, itself included. Zero: as many as the largest fan_out of any source. Setting it where
   /// a stage can no longer fan out lets more items be in flight within the same bound.
   std::uint32_t weight = 0;
+
+  /// How many calls of the kernel may be under way at once, in one run. Zero: any number; 1: one
+  /// after another, so that the kernel needs no lock (each call sees what the last one wrote).
+  /// Blocks that must wait for their turn keep no worker waiting; partial ones are merged. Give a
+  /// serial stage a high rank: all that follows waits for it.
+  std::uint32_t concurrency = 0;
+
+  /// The kernel waits, for a disk, a network or a device. It then runs on `concurrency` threads of
+  /// its own (which must not be zero), outside the arena, which are started when first needed and
+  /// end with the run, and its waiting costs no worker. One call handles its items one after
+  /// another, so keep block_items small. In serial runs the calling thread does all.
+  bool blocking = false;
 };
 
 /// SourceStatus is what a source says about its future.

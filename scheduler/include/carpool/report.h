@@ -70,6 +70,10 @@ struct RunReport {
   std::vector<StageReport> stages = {};
   std::vector<SourceReport> sources = {};
   std::vector<WorkerReport> workers = {};
+
+  /// The threads of blocking stages, in order of their stages. They are not workers: their time is
+  /// in blocking_seconds alone. Only batches, items and kernel_seconds are counted.
+  std::vector<WorkerReport> blocking_threads = {};
   std::string policy = {};
 
   double seconds = 0;         ///< Wall time of the run.
@@ -77,6 +81,7 @@ struct RunReport {
   double source_seconds = 0;
   double scheduler_seconds = 0;
   double idle_seconds = 0;  ///< Worker time without a batch: searching, or away for lack of work.
+  double blocking_seconds = 0;  ///< In kernels of blocking stages, summed over their threads.
 
   std::size_t peak_bytes = 0;        ///< Memory taken for blocks and tables.
   std::size_t worst_case_bytes = 0;  ///< What the formula allowed.

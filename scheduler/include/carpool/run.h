@@ -112,8 +112,11 @@ struct RunOptions {
 /// throw.
 RunReport run(const Graph& graph, const RunOptions& options = {});
 
-/// worker_count returns how many workers such a run would have, which is the size for per-worker
-/// scratch memory: Batch::worker is below it.
+/// worker_count returns how many workers such a run would have, the threads of blocking stages
+/// among them, which is the size for per-worker scratch memory: Batch::worker is below it.
+std::uint32_t worker_count(const Graph& graph, const RunOptions& options = {});
+
+/// worker_count, for graphs without blocking stages, and before there is a graph.
 std::uint32_t worker_count(const RunOptions& options = {});
 
 /// worst_case_bytes returns how much memory the blocks and tables of such a run can need. A run
