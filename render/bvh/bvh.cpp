@@ -66,8 +66,7 @@ bool IsTransparent(const SceneTables& scene, const Placement& placement) {
 }
 
 bool Bvh::CountMemory(void* self, ssize_t bytes, bool) {
-  std::atomic_ref<uint64_t>(static_cast<Bvh*>(self)->bytes_)
-      .fetch_add(static_cast<uint64_t>(bytes));
+  static_cast<Bvh*>(self)->bytes_ += static_cast<uint64_t>(bytes);
   return true;
 }
 

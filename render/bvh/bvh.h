@@ -1,6 +1,7 @@
 // Builds Embree's acceleration structures over the placements and keeps them alive.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -53,7 +54,7 @@ class Bvh {
                      bool transparent, bool robust, std::vector<int32_t>& members);
   static bool CountMemory(void* self, ssize_t bytes, bool post);
 
-  uint64_t bytes_ = 0;
+  std::atomic<uint64_t> bytes_{0};
   double seconds_ = 0;
   DevicePtr device_;
   Level opaque_, transparent_;
