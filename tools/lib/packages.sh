@@ -8,6 +8,7 @@ readonly carpool_packages=(
   'cmake               command:cmake'
   'ninja-build         command:ninja'
   'pkg-config          command:pkg-config'
+  'spin                command:spin'
   'libtbb-dev          header:tbb/task_arena.h'
   'libembree-dev       header:embree4/rtcore.h,embree3/rtcore.h'
   'libopenexr-dev      header:OpenEXR/ImfMultiPartOutputFile.h'
