@@ -35,7 +35,9 @@ std::string DeviceConfig(const std::string& isa) {
 ScenePtr NewScene(RTCDevice device, bool robust) {
   ScenePtr scene(rtcNewScene(device));
   if (!scene) ThrowEmbree(device, "making a scene");
-  rtcSetSceneFlags(scene.get(), robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+  // The filter is asked for by the few rays that go on through layers.
+  rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(stages::kFilterPerRay |
+                                                           (robust ? RTC_SCENE_FLAG_ROBUST : 0)));
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
   return scene;
 }
@@ -71,7 +73,7 @@ bool Bvh::CountMemory(void* self, ssize_t bytes, bool) {
 }
 
 Bvh::Bvh(SceneTables& scene, const PlacementPlan& plan, const BvhOptions& options)
-    : device_(rtcNewDevice(DeviceConfig(options.isa).c_str())) {
+    : geometry_(scene.geometry), device_(rtcNewDevice(DeviceConfig(options.isa).c_str())) {
   if (!device_) ThrowEmbree(nullptr, "starting");
   const auto begin = std::chrono::steady_clock::now();
   rtcSetDeviceMemoryMonitorFunction(device_.get(), &CountMemory, this);
@@ -156,7 +158,7 @@ stages::TraceView Bvh::View() const {
   const auto view = [](const Level& level) {
     return TraceLevel{level.scene.get(), level.top.data(), level.nested.data()};
   };
-  return {view(opaque_), view(transparent_)};
+  return {view(opaque_), view(transparent_), stages::ViewOf(geometry_)};
 }
 
 }  // namespace carpool::render

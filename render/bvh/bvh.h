@@ -54,6 +54,7 @@ class Bvh {
                      bool transparent, bool robust, std::vector<int32_t>& members);
   static bool CountMemory(void* self, ssize_t bytes, bool post);
 
+  const stages::GeometryTables& geometry_;
   std::atomic<uint64_t> bytes_{0};
   double seconds_ = 0;
   DevicePtr device_;

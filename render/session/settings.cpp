@@ -20,6 +20,8 @@ constexpr NameTable<Policy, 3> kPolicies{
     {{"deepest", Policy::deepest}, {"fullest", Policy::fullest}, {"oldest", Policy::oldest}}};
 constexpr NameTable<Isa, 4> kIsas{
     {{"auto", Isa::automatic}, {"sse4", Isa::sse4}, {"avx2", Isa::avx2}, {"avx512", Isa::avx512}}};
+constexpr NameTable<DirectLight, 3> kDirectLights{
+    {{"mis", DirectLight::mis}, {"light", DirectLight::light}, {"bsdf", DirectLight::bsdf}}};
 constexpr NameTable<Aov, 7> kAovs{{{"albedo", Aov::albedo},
                                    {"normal", Aov::normal},
                                    {"depth", Aov::depth},
@@ -94,6 +96,7 @@ void CheckSettings(const RenderSettings& s) {
   CheckRange("--time", s.time_seconds, 0, 1e9);
   CheckRange("--noise", s.noise_target, 0, 1);
   CheckRange("--depth", s.max_depth, 0, kMaxDepth);
+  CheckRange("--roulette", s.roulette_depth, 0, kMaxDepth);
   CheckRange("--exposure", s.exposure, -64, 64);
   CheckRange("--threads", s.threads, 0, kMaxThreads);
   CheckRange("--memory", s.memory_mb, 0, 1 << 20);
@@ -114,6 +117,9 @@ std::string_view Name(Policy policy) {
 std::string_view Name(Isa isa) {
   return NameIn(kIsas, isa);
 }
+std::string_view Name(DirectLight direct) {
+  return NameIn(kDirectLights, direct);
+}
 std::string_view Name(Aov aov) {
   return NameIn(kAovs, aov);
 }
@@ -126,6 +132,10 @@ Policy ParsePolicy(std::string_view name) {
 }
 Isa ParseIsa(std::string_view name) {
   return Lookup(kIsas, "--isa", name);
+}
+
+DirectLight ParseDirectLight(std::string_view name) {
+  return Lookup(kDirectLights, "--direct", name);
 }
 
 AovSet ParseAovs(std::string_view list) {

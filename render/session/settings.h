@@ -18,6 +18,14 @@ enum class Policy { deepest, fullest, oldest };
 /// The instruction set of the kernels and of Embree; `automatic` is the best the machine has.
 enum class Isa { automatic, sse4, avx2, avx512 };
 
+/// How light that reaches a surface directly is found. The expectation of the image is the same: a
+/// difference beyond noise is a fault, which is what the other two are for.
+enum class DirectLight {
+  mis,    // light and BSDF sampling, weighted by the power heuristic (Veach and Guibas 1995)
+  light,  // light sampling alone
+  bsdf,   // BSDF sampling alone; punctual lights, which it cannot hit, are sampled still
+};
+
 /// Image layers beside the beauty.
 enum class Aov : std::uint32_t {
   albedo = 1u << 0,
@@ -43,7 +51,7 @@ inline constexpr int kMaxSide = 65'536;                // pixels along one side 
 inline constexpr std::int64_t kMaxPixels = 1ll << 28;  // pixels in one image
 inline constexpr int kMaxSamples = 1 << 20;            // samples per pixel
 inline constexpr int kMaxDepth = 256;                  // scattering vertices of a path
-inline constexpr int kRouletteDepth = 3;  // vertices before Russian roulette may end a path
+inline constexpr int kRouletteDepth = 3;               // default of RenderSettings::roulette_depth
 inline constexpr int kMaxThreads = 4096;
 inline constexpr int kMinBatchItems = 8, kMaxBatchItems = 65'536;
 inline constexpr int kDefaultWidth = 1280;  // pixels, where no size is asked for
@@ -79,9 +87,11 @@ struct RenderSettings {
   double time_seconds = 0;        ///< stop rendering after this many seconds; 0: no limit
   double noise_target = 0;        ///< stop below this relative standard error, 0..1; 0: no target
   /// Scattering vertices of a path at most, 0..kMaxDepth: 0 shows emission alone, 1 adds direct
-  /// light, 2 one bounce between surfaces. From kRouletteDepth on, Russian roulette ends dark paths
-  /// without bias.
+  /// light, 2 one bounce between surfaces.
   int max_depth = 8;
+  /// Vertices before Russian roulette may end dark paths, 0..kMaxDepth; it does so without bias.
+  int roulette_depth = kRouletteDepth;
+  DirectLight direct = DirectLight::mis;
   std::uint32_t seed = 0;  ///< another seed, another noise
 
   // The machine. None of these changes the image, except `isa` and `robust` in its last bits.
@@ -111,12 +121,14 @@ std::string PngPath(std::string_view output_path);
 std::string_view Name(Executor executor);
 std::string_view Name(Policy policy);
 std::string_view Name(Isa isa);
+std::string_view Name(DirectLight direct);
 std::string_view Name(Aov aov);
 
 // The reverse; each throws Error(ExitCode::usage) that lists the names it knows.
 Executor ParseExecutor(std::string_view name);
 Policy ParsePolicy(std::string_view name);
 Isa ParseIsa(std::string_view name);
+DirectLight ParseDirectLight(std::string_view name);
 AovSet ParseAovs(std::string_view comma_separated);  // "albedo,normal", or "all"
 
 }  // namespace carpool::render

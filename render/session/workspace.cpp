@@ -14,6 +14,18 @@ uint64_t MemoryBytes(const RenderSettings& settings, int threads) {
          (uint64_t{4} << 20) * static_cast<uint64_t>(std::max(0, threads - 2));
 }
 
+stages::DirectSampling DirectSampling(DirectLight direct) {
+  switch (direct) {
+    case DirectLight::light:
+      return stages::DirectSampling::light;
+    case DirectLight::bsdf:
+      return stages::DirectSampling::bsdf;
+    case DirectLight::mis:
+      break;
+  }
+  return stages::DirectSampling::mis;
+}
+
 carpool::Policy SchedulerPolicy(Policy policy) {
   switch (policy) {
     case Policy::fullest:
@@ -79,7 +91,8 @@ stages::KernelContext MakeContext(const PreparedScene& scene, const Plan& plan,
   c.height = static_cast<uint32_t>(scene.height);
   c.seed = settings.seed;
   c.max_depth = static_cast<uint32_t>(settings.max_depth);
-  c.roulette_depth = kRouletteDepth;
+  c.roulette_depth = static_cast<uint32_t>(settings.roulette_depth);
+  c.direct = DirectSampling(settings.direct);
   return c;
 }
 

@@ -18,6 +18,10 @@
 
 namespace carpool::stages {
 
+/// Which samples of direct light count: both strategies, weighted, or one of them alone (delta
+/// lights are always sampled as lights).
+enum class DirectSampling : uint8_t { mis, light, bsdf };
+
 /// All that kernels read of a render; borrowed, constant while it runs.
 struct KernelContext {
   Camera camera;
@@ -33,6 +37,7 @@ struct KernelContext {
   uint32_t seed = 0;
   uint32_t max_depth = 8;       // scattering events
   uint32_t roulette_depth = 3;  // events before Russian roulette
+  DirectSampling direct = DirectSampling::mis;
 };
 
 /// Where a path goes next.

@@ -28,6 +28,15 @@ HWY_INLINE Real<D> PowerHeuristic(D d, Real<D> own, Real<D> other) {
   return Splat(d, 1) / hn::MulAdd(ratio, ratio, Splat(d, 1));
 }
 
+/// Weight of a sample of direct light that strategy `own` made with density `own_pdf`, where the
+/// other strategy has `other_pdf`.
+template <class D>
+HWY_INLINE Real<D> StrategyWeight(D d, const KernelContext& c, DirectSampling own, Real<D> own_pdf,
+                                  Real<D> other_pdf) {
+  if (c.direct == DirectSampling::mis) return PowerHeuristic(d, own_pdf, other_pdf);
+  return Splat(d, c.direct == own ? 1 : 0);
+}
+
 template <class D>
 HWY_INLINE Mask<D> AtLeast(D d, Uint<D> depth, uint32_t least) {
   const IntTag<D>
@@ -117,15 +126,13 @@ HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha, Mask<D>
   return hn::And(active, hn::Or(transparent, culled));
 }
 
-/// The same ray goes on from just behind the layer. Past the largest number of layers the path
-/// ends.
+/// The same ray goes on: what it hits next at the same place, or behind, is for tracing to find.
+/// Past the largest number of layers the path ends.
 template <class D>
 HWY_INLINE void ContinueThrough(D d, const Vertex<D>& v, Mask<D> passes, Next* next) {
   const UintTag<D> du;
-  const Real<D> tnear = hn::MulAdd(v.distance, Splat(d, 0x1p-20), v.distance);
   const Uint<D> flags = v.flags + hn::Set(du, 1u << kPathLayerShift);
   const LaneList<D> list = ListLanes(d, v.path, passes);
-  StoreWord(d, list, offsetof(PathState, tnear), tnear);
   StoreWord(d, list, offsetof(PathState, flags), flags);
   for (size_t i = 0; i < list.count; ++i) {
     const uint32_t layers = (list.path[i]->flags & kPathLayerMask) >> kPathLayerShift;
@@ -181,7 +188,8 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> a
     const Real<D> pdf =
         lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
                                        t.p1, t.p2, Neg<D>(v.toward), v.distance);
-    weight = hn::IfThenElse(sampled, PowerHeuristic(d, v.ray_pdf, pdf), weight);
+    weight =
+        hn::IfThenElse(sampled, StrategyWeight(d, c, DirectSampling::bsdf, v.ray_pdf, pdf), weight);
   }
   const Vec3<D> added = Scale(Mul<D>(v.throughput, emitted), weight);
   v.radiance = Select<D>(active, Add<D>(v.radiance, added), v.radiance);
@@ -266,7 +274,8 @@ HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& 
   if (hn::AllFalse(d, wanted)) return shadow;
 
   const BsdfValue<D> f = EvaluateBsdf(d, s.bsdf, s.wo, ToLocal(s.frame, light.wi));
-  const Real<D> mis = hn::IfThenElse(light.delta, Splat(d, 1), PowerHeuristic(d, light.pdf, f.pdf));
+  const Real<D> mis = hn::IfThenElse(light.delta, Splat(d, 1),
+                                     StrategyWeight(d, c, DirectSampling::light, light.pdf, f.pdf));
   const Real<D> scale = SafeDiv(d, mis, light.pdf);
   const Vec3<D> incoming = SampledRadiance(d, c, light, wanted);
   shadow.radiance = Scale(Mul<D>(Mul<D>(v.throughput, f.f_cos), incoming), scale);
@@ -408,7 +417,8 @@ HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
   const Mask<D> bounced = hn::Gt(pdf, hn::Zero(d));
   const EnvironmentValue<D> environment = LookUpEnvironment(d, c.lights.environment, direction);
   const Real<D> light_pdf = environment.pdf * Splat(d, c.lights.environment_probability);
-  const Real<D> weight = hn::IfThenElse(bounced, PowerHeuristic(d, pdf, light_pdf), Splat(d, 1));
+  const Real<D> weight = hn::IfThenElse(
+      bounced, StrategyWeight(d, c, DirectSampling::bsdf, pdf, light_pdf), Splat(d, 1));
   const Vec3<D> throughput = PathVec3(d, p, offsetof(PathState, throughput));
   const Vec3<D> sum = Add<D>(PathVec3(d, p, offsetof(PathState, radiance)),
                              Scale(Mul<D>(throughput, environment.radiance), weight));

@@ -6,12 +6,19 @@
 
 namespace carpool::stages {
 
+/// The first of the hits at one place along a ray, as far as arithmetic can tell places apart.
+struct LayerMark {
+  int32_t placement;
+  uint32_t primitive;
+  float distance;
+};
+
 /// One path is in exactly one queue at a time, so its state has one owner at a time. 32 words.
 struct alignas(128) PathState {
   // The ray to trace next; it starts at the previous vertex (moved off the surface by its error
   // bound).
   float origin[3];
-  float tnear;         // 0, or just past the last transparent hit along this same ray
+  float tnear;         // 0, or past the transparent hits that this same ray has behind it
   float direction[3];  // unit length
   float pdf;           // solid-angle density that chose `direction`; 0: camera ray, no MIS partner
   float throughput[3];
@@ -28,8 +35,12 @@ struct alignas(128) PathState {
   float distance;
 
   // The one shadow ray of this vertex, from `origin`; its contribution is added if it is
-  // unoccluded.
-  float shadow_direction[3];
+  // unoccluded. While the path's own ray is being traced, the place of its last hit instead: where
+  // to look for more hits there if this one lets the ray through.
+  union {
+    float shadow_direction[3];
+    LayerMark first_layer;
+  };
   float shadow_distance;  // 0: none
   float shadow_radiance[3];
   uint32_t normal;  // shading normal at `origin`, octahedral 2 x 16 bit: light selection needs it

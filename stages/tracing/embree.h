@@ -7,9 +7,34 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <utility>
+
 namespace carpool::stages {
 
 enum class Coherence { incoherent, coherent };
+
+#if RTC_VERSION_MAJOR >= 4
+using EmbreeContext = RTCRayQueryContext;
+constexpr RTCSceneFlags kFilterPerRay = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+#else
+using EmbreeContext = RTCIntersectContext;
+constexpr RTCSceneFlags kFilterPerRay = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+#endif
+
+/// What travels with a ray that gathers: Embree hands its context back to the filter.
+template <class Visit>
+struct GatherContext {
+  EmbreeContext embree;
+  Visit visit;
+
+  /// Tells of a hit and turns it down, so that traversal goes on.
+  static void Filter(const RTCFilterFunctionNArguments* arguments) {
+    const auto* const self = reinterpret_cast<const GatherContext*>(arguments->context);
+    self->visit(rtcGetHitFromHitN(arguments->hit, arguments->N, 0),
+                RTCRayN_tfar(arguments->ray, arguments->N, 0));
+    arguments->valid[0] = 0;
+  }
+};
 
 #if RTC_VERSION_MAJOR >= 4
 
@@ -33,6 +58,20 @@ inline void EmbreeOccluded1(RTCScene scene, RTCRay* ray) {
   rtcInitOccludedArguments(&arguments);
   rtcOccluded1(scene, ray, &arguments);
 }
+/// Calls visit(RTCHit, t) for every hit with tnear < t <= tfar, in no order, some maybe twice. The
+/// scene needs kFilterPerRay.
+template <class Visit>
+void EmbreeGather1(RTCScene scene, RTCRay* ray, Visit visit) {
+  GatherContext<Visit> context{{}, std::move(visit)};
+  rtcInitRayQueryContext(&context.embree);
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.flags = static_cast<RTCRayQueryFlags>(RTC_RAY_QUERY_FLAG_INCOHERENT |
+                                                  RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
+  arguments.context = &context.embree;
+  arguments.filter = &GatherContext<Visit>::Filter;
+  rtcOccluded1(scene, ray, &arguments);
+}
 
 #else
 
@@ -54,6 +93,12 @@ inline void EmbreeIntersect8(const int* valid, RTCScene scene, RTCRayHit8* rays,
 inline void EmbreeOccluded1(RTCScene scene, RTCRay* ray) {
   RTCIntersectContext context = IntersectContext(Coherence::incoherent);
   rtcOccluded1(scene, &context, ray);
+}
+template <class Visit>
+void EmbreeGather1(RTCScene scene, RTCRay* ray, Visit visit) {
+  GatherContext<Visit> context{IntersectContext(Coherence::incoherent), std::move(visit)};
+  context.embree.filter = &GatherContext<Visit>::Filter;
+  rtcOccluded1(scene, &context.embree, ray);
 }
 
 #endif

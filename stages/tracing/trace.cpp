@@ -1,33 +1,15 @@
 // Ray queries through Embree: single rays for what bounced, coherent packets for camera rays.
 #include "stages/tracing/trace.h"
 
-#include <cmath>
 #include <limits>
+#include <span>
+
+#include "stages/tracing/layers.h"
 
 namespace carpool::stages {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-void SetRay(RTCRay& ray, const float origin[3], const float direction[3], float tnear, float tfar) {
-  ray.org_x = origin[0];
-  ray.org_y = origin[1];
-  ray.org_z = origin[2];
-  ray.dir_x = direction[0];
-  ray.dir_y = direction[1];
-  ray.dir_z = direction[2];
-  ray.tnear = tnear;
-  ray.tfar = tfar;
-  ray.time = 0;
-  ray.mask = ~0u;
-  ray.id = 0;
-  ray.flags = 0;
-}
-
-int32_t PlacementOf(const TraceLevel& level, unsigned instance, unsigned geometry) {
-  if (instance == RTC_INVALID_GEOMETRY_ID) return level.top[geometry];
-  return level.nested[level.top[instance] + static_cast<int32_t>(geometry)];
-}
 
 // Shrinks ray.tfar to the nearest hit of `level`; true if there is one.
 bool Nearest(const TraceLevel& level, RTCRayHit& ray, PathState& path) {
@@ -63,30 +45,35 @@ void NearestOfPacket(const TraceLevel& level, const int* valid, RTCRayHit8& rays
   }
 }
 
+void MarkFirstLayer(PathState& path) {
+  path.first_layer = {path.placement, path.primitive, path.distance};
+}
+
 // Product of what the transparent layers along the shadow ray let through.
-float Transmittance(const TraceLevel& level, const OpacityQuery& query, const PathState& path) {
+float Transmittance(const TraceView& view, const OpacityQuery& query, const PathState& path) {
+  const std::span<const LayerHit> layers = ShadowLayers(view, path);
+  if (layers.size() > kMaxAlphaLayers) return 0;
   float through = 1;
-  float tnear = 0;
-  for (uint32_t layer = 0; layer < kMaxAlphaLayers; ++layer) {
-    RTCRayHit ray;
-    SetRay(ray.ray, path.origin, path.shadow_direction, tnear, path.shadow_distance);
-    PathState hit;
-    if (!Nearest(level, ray, hit)) return through;
+  for (const LayerHit& hit : layers) {
     through *= 1 - query.opacity(query.context, hit.placement, hit.primitive, hit.u, hit.v);
     if (through <= 0) return 0;
-    tnear = std::nextafter(hit.distance, kInfinity);
   }
-  return 0;
+  return through;
 }
 
 }  // namespace
 
 void IntersectPath(const TraceView& view, PathState& path) {
+  if ((path.flags & kPathLayerMask) != 0) {
+    if (NextLayerHere(view, path)) return;
+    path.tnear = path.first_layer.distance + LayerReach(path);
+  }
   RTCRayHit ray;
   SetRay(ray.ray, path.origin, path.direction, path.tnear, kInfinity);
   path.placement = -1;
   Nearest(view.opaque, ray, path);
   Nearest(view.transparent, ray, path);
+  MarkFirstLayer(path);
 }
 
 void IntersectPacket(const TraceView& view, PathState* const paths[8]) {
@@ -111,6 +98,9 @@ void IntersectPacket(const TraceView& view, PathState* const paths[8]) {
   }
   NearestOfPacket(view.opaque, valid, rays, paths);
   NearestOfPacket(view.transparent, valid, rays, paths);
+  for (int i = 0; i < 8; ++i) {
+    if (paths[i] != nullptr) MarkFirstLayer(*paths[i]);
+  }
 }
 
 void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& path) {
@@ -122,7 +112,7 @@ void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& 
     if (ray.tfar < 0) through = 0;
   }
   if (through > 0 && view.transparent.scene != nullptr) {
-    through = Transmittance(view.transparent, opacity, path);
+    through = Transmittance(view, opacity, path);
   }
   for (int c = 0; c < 3; ++c) path.radiance[c] += through * path.shadow_radiance[c];
   path.shadow_distance = 0;

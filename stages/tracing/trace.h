@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "stages/tables/geometry_view.h"
 #include "stages/tables/path.h"
 #include "stages/tracing/embree.h"
 
@@ -21,6 +22,7 @@ struct TraceLevel {
 struct TraceView {
   TraceLevel opaque;
   TraceLevel transparent;
+  GeometryView geometry;  // tells which triangles are neighbours
 };
 
 /// What stands at (placement, primitive, u, v) lets `1 - opacity` of a shadow ray through. Called
@@ -31,8 +33,9 @@ struct OpacityQuery {
                    float v) = nullptr;
 };
 
-/// Finds the nearest hit of the path's ray and writes placement, primitive, u, v and distance.
-/// Deterministic: the same ray gives the same hit in every executor.
+/// Finds the next hit of the path's ray and writes placement, primitive, u, v and distance: the
+/// nearest, or the one after the last if that let the ray through (layers.h says what comes after
+/// what). Deterministic: the same ray gives the same hit in every executor.
 void IntersectPath(const TraceView& view, PathState& path);
 
 /// Eight camera rays of a fixed 4x2 pixel group, as one coherent packet. Null entries are skipped.

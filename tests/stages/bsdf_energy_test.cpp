@@ -8,7 +8,7 @@
 
 #include "stages/tables/bsdf_tables.h"
 #include "tests/stages/bsdf_directions.h"
-#include "tests/stages/numerics_statistics.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::tests {
 namespace {
@@ -29,7 +29,7 @@ const Columns& ScrambleUniforms(uint32_t scramble) {
 
 /// Directional albedo with the standard error that the scrambles show; the largest weight met.
 struct Furnace {
-  Mean albedo[3];
+  test::Mean albedo[3];
   double largest_weight = 0;
 };
 Furnace MeasureFurnace(const Surface& surface, double mu) {
@@ -102,7 +102,7 @@ TEST(BsdfEnergy, NoSurfaceReturnsMoreThanItGets) {
       Surface s = Mixed(roughness);
       s.base[0] = 1;
       const Furnace furnace = MeasureFurnace(s, mu);
-      for (const Mean& channel : furnace.albedo) {
+      for (const test::Mean& channel : furnace.albedo) {
         EXPECT_LE(channel.Value(),
                   1 + stages::kAlbedoResidualGrazing + kDeviations * channel.Error())
             << s.name << ", mu " << mu;
@@ -128,7 +128,7 @@ TEST(BsdfEnergy, WeightsAreBounded) {
 
 // Hard case 13.
 TEST(BsdfEnergy, SingleScatteringAtAlphaOneReturnsOneMinusLnTwo) {
-  Mean mean;
+  test::Mean mean;
   for (uint32_t s = 0; s < kScrambles; ++s) {
     const Columns& u = ScrambleUniforms(s);
     const Columns out = BestBsdfKernels().visible(1, {0, 0, 1}, {u[1], u[2]});

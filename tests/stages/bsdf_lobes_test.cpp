@@ -7,8 +7,8 @@
 #include "hwy/highway.h"
 #include "stages/kernels/bsdf-inl.h"
 #include "tests/stages/bsdf_directions.h"
-#include "tests/stages/numerics_statistics.h"
 #include "tests/stages/sampling_columns-inl.h"
+#include "tests/support/statistics.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
@@ -98,7 +98,7 @@ namespace {
 TEST(BsdfLobes, VarnishOverWhiteReturnsAllLight) {
   for (const double roughness : {0.0, 0.1, 0.2}) {
     for (const double mu : {0.2, 0.5, 1.0}) {
-      Mean mean;
+      test::Mean mean;
       for (uint32_t s = 0; s < 16; ++s)
         mean.Add(stages::HWY_NAMESPACE::VarnishedFurnace(roughness, mu, SamplerUniforms(s, 4096)));
       EXPECT_NEAR(mean.Value(), 1, stages::kAlbedoResidual + 7.8 * mean.Error())

@@ -11,7 +11,7 @@
 #include <numbers>
 
 #include "tests/stages/bsdf_directions.h"
-#include "tests/stages/numerics_statistics.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::tests {
 namespace {
@@ -116,7 +116,7 @@ double SampleTest(const Grid& grid, const Columns& wi, const std::vector<double>
     total += masses[i];
   }
   masses.push_back(std::max(0.0, wi[0].size() - total));
-  return ChiSquaredTest(counts, masses);
+  return test::ChiSquaredTest(counts, masses);
 }
 
 Pdf PdfOf(const Surface& surface, const Direction& wo) {
@@ -153,7 +153,7 @@ TEST(BsdfSampling, MixtureFollowsItsDensityOverTheSphere) {
   for (const double roughness : {0.4, 0.6, 1.0}) {
     for (const double mu : {0.04, 0.3, 0.9}) {
       for (const Surface& s : {WhiteMetal(roughness), Mixed(roughness)}) {
-        EXPECT_GT(MixtureTest(s, s, mu, ++seed, false), kFalseAlarm)
+        EXPECT_GT(MixtureTest(s, s, mu, ++seed, false), test::kFalseAlarm)
             << s.name << ", mu " << mu << ", seed " << seed;
       }
     }
@@ -165,7 +165,7 @@ TEST(BsdfSampling, MixtureFollowsItsDensityAroundTheMirror) {
   for (const double roughness : {0.01, 0.03, 0.1, 0.2}) {
     for (const double mu : {0.3, 0.9}) {
       for (const Surface& s : {WhiteMetal(roughness), Mixed(roughness)}) {
-        EXPECT_GT(MixtureTest(s, s, mu, ++seed, true), kFalseAlarm)
+        EXPECT_GT(MixtureTest(s, s, mu, ++seed, true), test::kFalseAlarm)
             << s.name << ", mu " << mu << ", seed " << seed;
       }
     }
@@ -176,13 +176,13 @@ TEST(BsdfSampling, MixtureFollowsItsDensityAroundTheMirror) {
 TEST(BsdfSampling, ChiSquaredSeesWrongDensities) {
   Surface rougher = WhiteMetal(0.5);
   rougher.roughness = 0.505;
-  EXPECT_LT(MixtureTest(WhiteMetal(0.5), rougher, 0.5, 300, false), kFalseAlarm);
+  EXPECT_LT(MixtureTest(WhiteMetal(0.5), rougher, 0.5, 300, false), test::kFalseAlarm);
   Surface sharper = WhiteMetal(0.03);
   sharper.roughness = 0.0306;
-  EXPECT_LT(MixtureTest(WhiteMetal(0.03), sharper, 0.5, 301, true), kFalseAlarm);
+  EXPECT_LT(MixtureTest(WhiteMetal(0.03), sharper, 0.5, 301, true), test::kFalseAlarm);
   Surface denser = WhiteDielectric(0.5);
   denser.ior = 1.62;
-  EXPECT_LT(MixtureTest(WhiteDielectric(0.5), denser, 0.5, 302, false), kFalseAlarm);
+  EXPECT_LT(MixtureTest(WhiteDielectric(0.5), denser, 0.5, 302, false), test::kFalseAlarm);
 }
 
 TEST(BsdfSampling, VisibleNormalsFollowTheirDensityOverTheWholeSphere) {
@@ -197,7 +197,8 @@ TEST(BsdfSampling, VisibleNormalsFollowTheirDensityOverTheWholeSphere) {
         return ReferenceBsdfKernels().visible_pdf(alpha, wo, wi);
       };
       const Columns wi(out.begin(), out.begin() + 3);
-      EXPECT_GT(SampleTest(grid, wi, nullptr, Masses(grid, pdf, FineSteps(mu)), 0), kFalseAlarm)
+      EXPECT_GT(SampleTest(grid, wi, nullptr, Masses(grid, pdf, FineSteps(mu)), 0),
+                test::kFalseAlarm)
           << "alpha " << alpha << ", mu " << mu << ", seed " << seed;
     }
   }
@@ -205,7 +206,7 @@ TEST(BsdfSampling, VisibleNormalsFollowTheirDensityOverTheWholeSphere) {
 
 /// A round light around the mirror direction, `radius` from its centre: f cos integrated over it.
 struct LightEstimates {
-  Mean light, bsdf;
+  test::Mean light, bsdf;
 };
 constexpr size_t kLightCount = 1 << 17;
 
@@ -249,7 +250,7 @@ TEST(BsdfSampling, LightSamplingEqualsBsdfSamplingAtSmallAlpha) {
         const LightEstimates e = EstimateLight(s, mu, 3 * alpha, seed += 2);
         const double z =
             (e.light.Value() - e.bsdf.Value()) / std::hypot(e.light.Error(), e.bsdf.Error());
-        EXPECT_GT(NormalTail(z), kFalseAlarm)
+        EXPECT_GT(test::NormalTail(z), test::kFalseAlarm)
             << s.name << ", mu " << mu << ": light " << e.light.Value() << " +- " << e.light.Error()
             << ", BSDF " << e.bsdf.Value() << " +- " << e.bsdf.Error();
         EXPECT_LT(e.light.Error(), 0.01 * e.light.Value());

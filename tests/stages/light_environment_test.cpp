@@ -10,7 +10,7 @@
 
 #include "render/lights/environment.h"
 #include "tests/stages/light_harness.h"
-#include "tests/stages/light_statistics.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::stages {
 namespace {
@@ -239,7 +239,7 @@ TEST(LightEnvironment, SamplesFollowTheDensity) {
         const int j = std::clamp(static_cast<int>(VOf(r.wi) * kBinsV), 0, kBinsV - 1);
         counts[j * kBinsU + i] += expected[j * kBinsU + i] > 0;
       }
-      EXPECT_LT(ChiSquaredZ(expected, counts), kLargestChiSquaredZ)
+      EXPECT_GT(test::ChiSquaredTest(counts, expected), test::kFalseAlarm)
           << runner.name << ' ' << map.width << 'x' << map.height;
     }
   }
@@ -260,18 +260,18 @@ TEST(LightEnvironment, IrradianceEqualsTheTexelSum) {
           const auto dir = DirectionOf(u, v);
           return map.Channel(u, v, c) * cosine(dir[0], dir[1], dir[2]);
         });
-        MeanEstimate estimate;
+        test::Mean estimate;
         for (const LightResult& r : results) {
           estimate.Add(r.radiance[c] * cosine(r.wi[0], r.wi[1], r.wi[2]) / r.pdf);
         }
         const double all =
             OverSphere(map, [&](double u, double v) { return map.Channel(u, v, c); });
         if (truth <= 1e-6 * all) {  // at most the corner of a tent: too rare for a z-test
-          EXPECT_LE(estimate.mean(), 1e-4 * all);
+          EXPECT_LE(estimate.Value(), 1e-4 * all);
           continue;
         }
-        EXPECT_LT(estimate.Z(truth, 2e-4), kLargestZ)
-            << map.width << 'x' << map.height << ' ' << estimate.mean() << " for " << truth;
+        EXPECT_LT(estimate.Z(truth, 2e-4), test::kLargestZ)
+            << map.width << 'x' << map.height << ' ' << estimate.Value() << " for " << truth;
       }
     }
   }

@@ -11,7 +11,7 @@
 #include "render/lights/environment.h"
 #include "tests/stages/light_harness.h"
 #include "tests/stages/light_scenes.h"
-#include "tests/stages/light_statistics.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::stages {
 namespace {
@@ -48,12 +48,12 @@ double Irradiance(const LightResult& r, const LightQuery& q, double emission) {
 }
 
 double MeanIrradiance(const LightScene& s, const LightRunner& runner, const LightQuery& receiver,
-                      double emission, MeanEstimate& estimate) {
+                      double emission, test::Mean& estimate) {
   for (const LightResult& r :
        runner.run(LightKernel::sample_light, s.view, WithRandomNumbers(receiver, 50000, 61))) {
     estimate.Add(Irradiance(r, receiver, emission));
   }
-  return estimate.mean();
+  return estimate.Value();
 }
 
 /// A 2 x 2 m square at height 1 that shines down, of two triangles.
@@ -93,7 +93,7 @@ TEST(LightSample, IrradianceOfEveryKindTogether) {
     if (runner.name.ends_with("x1")) continue;  // the same bits: WidthDoesNotMatter
     for (const bool all_sides : {false, true}) {
       const LightQuery receiver = LookingUp();
-      MeanEstimate estimate;
+      test::Mean estimate;
       auto queries = WithRandomNumbers(receiver, 200000, 62);
       if (all_sides) {
         for (LightQuery& q : queries) q.normal[1] = 0;
@@ -101,8 +101,8 @@ TEST(LightSample, IrradianceOfEveryKindTogether) {
       for (const LightResult& r : runner.run(LightKernel::sample_light, s.view, queries)) {
         estimate.Add(Irradiance(r, receiver, 2));
       }
-      EXPECT_LT(estimate.Z(IrradianceOfEveryKind(), 2e-5), kLargestZ)
-          << runner.name << " got " << estimate.mean() << " for " << IrradianceOfEveryKind();
+      EXPECT_LT(estimate.Z(IrradianceOfEveryKind(), 2e-5), test::kLargestZ)
+          << runner.name << " got " << estimate.Value() << " for " << IrradianceOfEveryKind();
     }
   }
 }
@@ -129,9 +129,9 @@ TEST(LightSample, EachKindAloneGetsEverySample) {
       truth = 6;
     }
     s.Build();
-    MeanEstimate estimate;
+    test::Mean estimate;
     MeanIrradiance(s, BestLightRunner(), LookingUp(), 2, estimate);
-    EXPECT_LT(estimate.Z(truth, 1e-5), kLargestZ) << kind << " got " << estimate.mean();
+    EXPECT_LT(estimate.Z(truth, 1e-5), test::kLargestZ) << kind << " got " << estimate.Value();
     LightQuery q = LookingUp();
     for (const float u : {0.0f, kLargestBelowOne}) {
       q.u_pick = u;
@@ -147,7 +147,7 @@ TEST(LightSample, ALightWithOneSideGivesNothingBehindIt) {
       LightScene s;
       AddSquare(s, 1, faces_down, two_sided);
       s.Build();
-      MeanEstimate estimate;
+      test::Mean estimate;
       const double mean = MeanIrradiance(s, BestLightRunner(), LookingUp(), 1, estimate);
       EXPECT_NEAR(mean, faces_down || two_sided ? kSquareIrradiance : 0, 0.02);
     }
@@ -274,7 +274,7 @@ TEST(LightSample, InstancedTrianglesAreInTheWorldAndMirroredOnesTurnTheirFront) 
       EXPECT_EQ(r[0].third[i], s.triangles[1].p2[i]);
     }
     EXPECT_EQ(r[0].delta, 1);  // mirrored
-    MeanEstimate below, above;
+    test::Mean below, above;
     EXPECT_GT(MeanIrradiance(s, runner, q, 1, below), 0.5);
     q.position[1] = 3;
     q.normal[1] = -1;

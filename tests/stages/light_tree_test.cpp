@@ -9,7 +9,7 @@
 
 #include "tests/stages/light_harness.h"
 #include "tests/stages/light_scenes.h"
-#include "tests/stages/light_statistics.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::stages {
 namespace {
@@ -51,7 +51,7 @@ TEST(LightTree, ProbabilitiesSumToOneOverTwelveDecades) {
       for (const LightResult& r : picks) nothing += r.light == kNone;
       nothing /= static_cast<double>(picks.size());
       const double error = std::sqrt(std::max(nothing, 1e-5) / static_cast<double>(picks.size()));
-      EXPECT_NEAR(sum + nothing, 1, kLargestZ * error) << runner.name;
+      EXPECT_NEAR(sum + nothing, 1, test::kLargestZ * error) << runner.name;
     }
   }
 }
@@ -95,7 +95,7 @@ TEST(LightTree, PicksFollowTheProbabilities) {
                WithPickNumbers(receiver, kPicks, static_cast<uint32_t>(38 + i)))) {
         ++counts[r.light == kNone ? counts.size() - 1 : static_cast<size_t>(r.light)];
       }
-      EXPECT_LT(ChiSquaredZ(expected, counts), kLargestChiSquaredZ);
+      EXPECT_GT(test::ChiSquaredTest(counts, expected), test::kFalseAlarm);
     }
   }
 }
@@ -140,7 +140,7 @@ TEST(LightTree, TheRemappedNumberIsUniform) {
            LightKernel::pick_light, s.view, WithPickNumbers(RandomReceiver(rng, 1), kPicks, 46))) {
     ++counts[static_cast<size_t>(r.u * 64)];
   }
-  EXPECT_LT(ChiSquaredZ(expected, counts), kLargestChiSquaredZ);
+  EXPECT_GT(test::ChiSquaredTest(counts, expected), test::kFalseAlarm);
 }
 
 /// Whether the middle or a corner of the light shines on the receiver at all.

@@ -8,7 +8,7 @@
 #include <random>
 
 #include "tests/stages/light_harness.h"
-#include "tests/stages/light_statistics.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::stages {
 namespace {
@@ -120,7 +120,7 @@ TEST(LightTriangle, MeanIsLambertsFormula) {
       const double omega = SolidAngle(c.p, c.ref);
       least = std::min(least, omega);
       greatest = std::max(greatest, omega);
-      MeanEstimate irradiance, solid_angle;
+      test::Mean irradiance, solid_angle;
       for (const LightResult& r :
            runner.run(LightKernel::sample_triangle, {}, WithRandomNumbers(c.query, 20000, 21))) {
         const double inverse = r.pdf > 0 ? 1 / r.pdf : 0.0;
@@ -128,11 +128,11 @@ TEST(LightTriangle, MeanIsLambertsFormula) {
         solid_angle.Add(inverse);
       }
       // Rounding: of the inputs' difference where the receiver all but lies in the plane.
-      EXPECT_LT(irradiance.Z(LambertIrradiance(c.p, c.ref, c.normal), 4e-5), kLargestZ)
-          << runner.name << " seen under " << omega << " got " << irradiance.mean() << " for "
+      EXPECT_LT(irradiance.Z(LambertIrradiance(c.p, c.ref, c.normal), 4e-5), test::kLargestZ)
+          << runner.name << " seen under " << omega << " got " << irradiance.Value() << " for "
           << LambertIrradiance(c.p, c.ref, c.normal);
-      EXPECT_LT(solid_angle.Z(omega, 4e-5), kLargestZ)
-          << runner.name << " seen under " << omega << " got " << solid_angle.mean();
+      EXPECT_LT(solid_angle.Z(omega, 4e-5), test::kLargestZ)
+          << runner.name << " seen under " << omega << " got " << solid_angle.Value();
     }
   }
   EXPECT_LT(least, 1e-6);
@@ -142,7 +142,7 @@ TEST(LightTriangle, MeanIsLambertsFormula) {
 TEST(LightTriangle, SquareAtHeightOne) {
   const Case lower({-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {0, 0, 0}, {0, 0, 1});
   const Case upper({-1, -1, 1}, {1, 1, 1}, {-1, 1, 1}, {0, 0, 0}, {0, 0, 1});
-  MeanEstimate irradiance;
+  test::Mean irradiance;
   const auto a = BestLightRunner().run(LightKernel::sample_triangle, {},
                                        WithRandomNumbers(lower.query, 400000, 22));
   const auto b = BestLightRunner().run(LightKernel::sample_triangle, {},
@@ -151,7 +151,7 @@ TEST(LightTriangle, SquareAtHeightOne) {
     irradiance.Add(a[i].wi[2] / a[i].pdf + b[i].wi[2] / b[i].pdf);
   }
   // The figure of HARD_CASES 26; its own rounding is 5e-6.
-  EXPECT_LT(irradiance.Z(0.55413 * kPi, 1e-5), kLargestZ) << irradiance.mean() / kPi;
+  EXPECT_LT(irradiance.Z(0.55413 * kPi, 1e-5), test::kLargestZ) << irradiance.Value() / kPi;
 }
 
 /// Splits barycentric space into 4^3 triangles and compares counts with their exact solid angles.
@@ -184,7 +184,7 @@ TEST(LightTriangle, PointsAreUniformOverTheSolidAngle) {
       const bool upper = (x - i) + (y - j) > 1 && i + j + 1 < kDivisions;
       ++counts[2ul * (i * kDivisions + j) + upper];
     }
-    EXPECT_LT(ChiSquaredZ(expected, counts), kLargestChiSquaredZ) << "seen under " << omega;
+    EXPECT_GT(test::ChiSquaredTest(counts, expected), test::kFalseAlarm) << "seen under " << omega;
   }
 }
 

@@ -3,5 +3,5 @@ add_executable(test-sampling
   ${CMAKE_CURRENT_LIST_DIR}/sampling_kernels.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sampling_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/sampling_warp_test.cpp)
-target_link_libraries(test-sampling PRIVATE carpool_stages carpool_simd GTest::gtest_main)
-gtest_discover_tests(test-sampling DISCOVERY_TIMEOUT 60)
+target_link_libraries(test-sampling PRIVATE carpool_stages carpool_simd test_support GTest::gtest_main)
+gtest_discover_tests(test-sampling DISCOVERY_TIMEOUT 60 PROPERTIES LABELS hard)

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "stages/sampling/dimensions.h"
-#include "tests/stages/numerics_statistics.h"
 #include "tests/stages/sampling_kernels.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::tests {
 namespace {
@@ -180,7 +180,7 @@ double PairTest(const std::vector<double>& a, const std::vector<double>& b, int 
   std::vector<double> counts(grid * grid, 0);
   for (size_t i = 0; i < a.size(); ++i)
     ++counts[static_cast<int>(a[i] * grid) * grid + static_cast<int>(b[i] * grid)];
-  return ChiSquaredTest(
+  return test::ChiSquaredTest(
       counts, std::vector<double>(grid * grid, static_cast<double>(a.size()) / (grid * grid)));
 }
 
@@ -191,19 +191,19 @@ TEST(Sampler, NumbersOfOneSampleAreIndependentAcrossPixels) {
   for (const uint32_t sample : {0u, 5u, 1022u}) {
     SCOPED_TRACE(sample);
     const Columns base = k.sample2(PixelDraws(sample, 1, Purpose::bsdf, kPixels));
-    EXPECT_GT(PairTest(base[0], base[1], 32), kFalseAlarm) << "x, y";
+    EXPECT_GT(PairTest(base[0], base[1], 32), test::kFalseAlarm) << "x, y";
     const Columns other = k.sample2(PixelDraws(sample, 1, Purpose::light_point, kPixels));
-    EXPECT_GT(PairTest(base[0], other[0], 32), kFalseAlarm) << "purposes, x";
-    EXPECT_GT(PairTest(base[0], other[1], 32), kFalseAlarm) << "purposes, y";
+    EXPECT_GT(PairTest(base[0], other[0], 32), test::kFalseAlarm) << "purposes, x";
+    EXPECT_GT(PairTest(base[0], other[1], 32), test::kFalseAlarm) << "purposes, y";
     const Columns next = k.sample2(PixelDraws(sample, 2, Purpose::bsdf, kPixels));
-    EXPECT_GT(PairTest(base[0], next[0], 32), kFalseAlarm) << "vertices";
+    EXPECT_GT(PairTest(base[0], next[0], 32), test::kFalseAlarm) << "vertices";
     const Columns group = k.sample2(PixelDraws(sample ^ 1, 1, Purpose::bsdf, kPixels));
-    EXPECT_GT(PairTest(base[0], group[0], 32), kFalseAlarm) << "groups";
+    EXPECT_GT(PairTest(base[0], group[0], 32), test::kFalseAlarm) << "groups";
     Draws seeded = PixelDraws(sample, 1, Purpose::bsdf, kPixels);
     seeded.seed = 1;
-    EXPECT_GT(PairTest(base[0], k.sample2(seeded)[0], 32), kFalseAlarm) << "seeds";
+    EXPECT_GT(PairTest(base[0], k.sample2(seeded)[0], 32), test::kFalseAlarm) << "seeds";
     std::vector<double> shifted(base[0].begin() + 1, base[0].end());
-    EXPECT_GT(PairTest(shifted, base[0], 32), kFalseAlarm) << "neighbouring pixels";
+    EXPECT_GT(PairTest(shifted, base[0], 32), test::kFalseAlarm) << "neighbouring pixels";
   }
 }
 
@@ -218,7 +218,7 @@ TEST(Sampler, DigitFlipsOfDimensionsAreIndependent) {
                  (static_cast<int>(std::ldexp(u[1][p], j + 1)) & 1);
       }
       const double z = (agree - kPixels / 2.0) / std::sqrt(kPixels / 4.0);
-      EXPECT_GT(NormalTail(z), kFalseAlarm / 144) << "digits " << i << ", " << j;
+      EXPECT_GT(test::NormalTail(z), test::kFalseAlarm / 144) << "digits " << i << ", " << j;
     }
   }
 }
@@ -231,8 +231,8 @@ TEST(Sampler, PurposesAndGroupsOfOnePixelArePadded) {
     const std::vector<double> a = k.sample1(GroupDraws(pixel, 0, 1, Purpose::lobe, kCount));
     const std::vector<double> b = k.sample1(GroupDraws(pixel, 0, 1, Purpose::roulette, kCount));
     const std::vector<double> c = k.sample1(GroupDraws(pixel, 1, 1, Purpose::lobe, kCount));
-    EXPECT_GT(PairTest(a, b, 16), kFalseAlarm);
-    EXPECT_GT(PairTest(a, c, 16), kFalseAlarm);
+    EXPECT_GT(PairTest(a, b, 16), test::kFalseAlarm);
+    EXPECT_GT(PairTest(a, c, 16), test::kFalseAlarm);
   }
 }
 
@@ -241,8 +241,8 @@ TEST(Sampler, HashIsUniformAndIndependentOverIterations) {
   Draws draws = GroupDraws(3, 0, 1, Purpose::alpha, kPixels);
   for (uint32_t i = 0; i < kPixels; ++i) draws.iteration[i] = i & 15, draws.sample[i] = i >> 4;
   const std::vector<double> u = k.hash(draws);
-  EXPECT_GT(PairTest({u.begin() + 1, u.end()}, u, 32), kFalseAlarm);
-  EXPECT_GT(PairTest({u.begin() + 16, u.end()}, u, 32), kFalseAlarm);
+  EXPECT_GT(PairTest({u.begin() + 1, u.end()}, u, 32), test::kFalseAlarm);
+  EXPECT_GT(PairTest({u.begin() + 16, u.end()}, u, 32), test::kFalseAlarm);
 }
 
 // A test of the test: correlated numbers must not pass.
@@ -252,7 +252,7 @@ TEST(Sampler, PairTestSeesCorrelation) {
   std::vector<double> mixed;
   for (size_t i = 0; i < u.size(); ++i)
     mixed.push_back(i % 16 == 0 ? u[i] : u[(i * 31) % u.size()]);
-  EXPECT_LT(PairTest(u, mixed, 32), kFalseAlarm);
+  EXPECT_LT(PairTest(u, mixed, 32), test::kFalseAlarm);
 }
 
 // Integrates x y over the square: 16 scrambles of 4096 samples; plain random numbers would err

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "stages/sampling/filter_table.h"
-#include "tests/stages/numerics_statistics.h"
 #include "tests/stages/sampling_kernels.h"
+#include "tests/support/statistics.h"
 
 namespace carpool::tests {
 namespace {
@@ -87,7 +87,7 @@ TEST(Warp, CosineHemisphereFollowsItsDensity) {
     ++counts[height * kTurns + std::min(kTurns - 1, static_cast<int>(turn * kTurns))];
   }
   const std::vector<double> expected(counts.size(), static_cast<double>(kCount) / counts.size());
-  EXPECT_GT(ChiSquaredTest(counts, expected), kFalseAlarm);
+  EXPECT_GT(test::ChiSquaredTest(counts, expected), test::kFalseAlarm);
 }
 
 /// Mass of the Blackman-Harris window below x pixels.
@@ -127,7 +127,7 @@ TEST(Filter, SamplesFollowTheWindow) {
   const Columns offset = BestSamplingKernels().filter(Points(kCount));
   for (int axis = 0; axis < 2; ++axis) {
     std::vector<double> counts(kCells, 0);
-    Mean mean, square;
+    test::Mean mean, square;
     for (const double x : offset[axis]) {
       ++counts[static_cast<int>((x / stages::kPixelFilterRadius + 1) / 2 * kCells)];
       mean.Add(x);

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "scenes/png_writer.h"
+
 namespace carpool::test {
 namespace {
 
@@ -36,13 +38,15 @@ SceneBuilder::SceneBuilder() {
            {"bufferViews", nlohmann::json::array()}};
 }
 
+void SceneBuilder::DeclareExtension(const std::string& name) {
+  nlohmann::json& used = json_["extensionsUsed"];
+  if (used.is_null() || std::find(used.begin(), used.end(), name) == used.end())
+    used.push_back(name);
+}
+
 int SceneBuilder::AddMaterial(const nlohmann::json& material) {
   if (material.contains("extensions")) {
-    for (const auto& [name, value] : material["extensions"].items()) {
-      nlohmann::json& used = json_["extensionsUsed"];
-      if (used.is_null() || std::find(used.begin(), used.end(), name) == used.end())
-        used.push_back(name);
-    }
+    for (const auto& [name, value] : material["extensions"].items()) DeclareExtension(name);
   }
   json_["materials"].push_back(material);
   return static_cast<int>(json_["materials"].size()) - 1;
@@ -99,18 +103,34 @@ int SceneBuilder::AddIndices(const std::vector<uint32_t>& indices) {
   return static_cast<int>(json_["accessors"].size()) - 1;
 }
 
+int SceneBuilder::AddTexture(int width, int height, const std::vector<uint8_t>& rgb,
+                             const nlohmann::json& sampler) {
+  const std::string png = scenes::EncodePng(width, height, rgb);
+  json_["images"].push_back({{"uri", "data:image/png;base64," + Base64({png.begin(), png.end()})}});
+  json_["samplers"].push_back(sampler);
+  json_["textures"].push_back(
+      {{"source", json_["images"].size() - 1}, {"sampler", json_["samplers"].size() - 1}});
+  return static_cast<int>(json_["textures"].size()) - 1;
+}
+
 int SceneBuilder::AddMesh(const std::vector<Point>& positions, const std::vector<uint32_t>& indices,
-                          int material, const std::vector<std::array<double, 2>>& uvs) {
-  std::vector<float> xyz, uv;
-  for (const Point& p : positions)
-    xyz.insert(xyz.end(),
-               {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
+                          int material, const std::vector<std::array<double, 2>>& uvs,
+                          const std::vector<Point>& normals) {
+  const auto flatten = [](const std::vector<Point>& points) {
+    std::vector<float> floats;
+    for (const Point& p : points)
+      floats.insert(floats.end(),
+                    {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
+    return floats;
+  };
+  std::vector<float> uv;
   for (const auto& t : uvs)
     uv.insert(uv.end(), {static_cast<float>(t[0]), static_cast<float>(t[1])});
-  nlohmann::json primitive = {{"attributes", {{"POSITION", AddAccessor(xyz, 3)}}},
+  nlohmann::json primitive = {{"attributes", {{"POSITION", AddAccessor(flatten(positions), 3)}}},
                               {"indices", AddIndices(indices)},
                               {"material", material}};
   if (!uv.empty()) primitive["attributes"]["TEXCOORD_0"] = AddAccessor(uv, 2);
+  if (!normals.empty()) primitive["attributes"]["NORMAL"] = AddAccessor(flatten(normals), 3);
   json_["meshes"].push_back({{"primitives", {primitive}}});
   return static_cast<int>(json_["meshes"].size()) - 1;
 }
@@ -143,16 +163,19 @@ int SceneBuilder::AddBox(double half, int material, bool inwards) {
   return AddMesh(points, indices, material);
 }
 
-int SceneBuilder::AddSphere(double radius, int rings, int material, bool inwards) {
+int SceneBuilder::AddSphere(double radius, int rings, int material, bool inwards, bool smooth) {
   constexpr double kPi = 3.14159265358979323846;
   const int segments = 2 * rings;
-  std::vector<Point> points;
+  std::vector<Point> points, normals;
   std::vector<uint32_t> indices;
   for (int r = 0; r <= rings; ++r) {
     for (int s = 0; s < segments; ++s) {
       const double theta = kPi * r / rings, phi = 2 * kPi * s / segments;
-      points.push_back({radius * std::sin(theta) * std::cos(phi), radius * std::cos(theta),
-                        -radius * std::sin(theta) * std::sin(phi)});
+      const Point p = {std::sin(theta) * std::cos(phi), std::cos(theta),
+                       -std::sin(theta) * std::sin(phi)};
+      points.push_back({radius * p[0], radius * p[1], radius * p[2]});
+      const double side = inwards ? -1 : 1;
+      if (smooth) normals.push_back({side * p[0], side * p[1], side * p[2]});
     }
   }
   for (int r = 0; r < rings; ++r) {
@@ -170,7 +193,7 @@ int SceneBuilder::AddSphere(double radius, int rings, int material, bool inwards
       if (r < rings - 1) indices.insert(indices.end(), quad.begin(), quad.begin() + 3);
     }
   }
-  return AddMesh(points, indices, material);
+  return AddMesh(points, indices, material, {}, normals);
 }
 
 int SceneBuilder::AddNode(const nlohmann::json& node) {
@@ -188,6 +211,23 @@ int SceneBuilder::AddCamera(const Point& eye, double yfov) {
   json_["cameras"].push_back(
       {{"type", "perspective"}, {"perspective", {{"yfov", yfov}, {"znear", 0.01}}}});
   return AddNode({{"camera", json_["cameras"].size() - 1}, {"translation", eye}});
+}
+
+int SceneBuilder::AddCameraAbove(const Point& eye, double half) {
+  json_["cameras"].push_back(
+      {{"type", "orthographic"},
+       {"orthographic", {{"xmag", half}, {"ymag", half}, {"znear", 0}, {"zfar", 100}}}});
+  return AddNode({{"camera", json_["cameras"].size() - 1},
+                  {"translation", eye},
+                  {"rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)}}});
+}
+
+int SceneBuilder::AddPunctual(const nlohmann::json& light, nlohmann::json node) {
+  DeclareExtension("KHR_lights_punctual");
+  nlohmann::json& lights = json_["extensions"]["KHR_lights_punctual"]["lights"];
+  lights.push_back(light);
+  node["extensions"]["KHR_lights_punctual"] = {{"light", lights.size() - 1}};
+  return AddNode(node);
 }
 
 std::filesystem::path SceneBuilder::Write(const std::filesystem::path& folder,

@@ -63,6 +63,14 @@ void AddSceneFlags(CLI::App& command, RenderFlags& flags) {
                   "scattering vertices of a path (default: 8); 0 emission, 1 direct light")
       ->type_name("N");
   command
+      .add_option("--roulette", s.roulette_depth,
+                  "vertices before Russian roulette may end dark paths (default: 3)")
+      ->type_name("N");
+  command
+      .add_option("--direct", flags.direct,
+                  "direct light by mis (default), light or bsdf sampling; only the noise differs")
+      ->type_name("NAME");
+  command
       .add_option("--executor", flags.executor,
                   "wavefront, megakernel or auto (default); the image is the same")
       ->type_name("NAME");
@@ -104,6 +112,7 @@ RenderSettings Settle(const RenderFlags& flags) {
   s.executor = render::ParseExecutor(flags.executor);
   s.policy = render::ParsePolicy(flags.policy);
   s.isa = render::ParseIsa(flags.isa);
+  s.direct = render::ParseDirectLight(flags.direct);
   s.write_png = !flags.no_png;
   s.robust = !flags.no_robust;
   const bool other_limit = s.time_seconds > 0 || s.noise_target > 0;

@@ -16,7 +16,7 @@ namespace carpool::tools {
 /// parsing, so it must live as long as the command.
 struct RenderFlags {
   render::RenderSettings settings;
-  std::string size, aovs, executor = "auto", policy = "deepest", isa = "auto";
+  std::string size, aovs, executor = "auto", policy = "deepest", isa = "auto", direct = "mis";
   std::optional<int> samples;
   bool no_png = false, no_robust = false;
 };

@@ -1,0 +1,145 @@
+// Gathers the hits of an interval of a ray, sorts them and leaves out neighbours.
+#include "stages/tracing/layers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <tuple>
+#include <vector>
+
+namespace carpool::stages {
+namespace {
+
+bool SameTriangle(const LayerHit& hit, int32_t placement, uint32_t primitive) {
+  return hit.placement == placement && hit.primitive == primitive;
+}
+
+bool Before(const LayerHit& a, const LayerHit& b) {
+  return std::tie(a.distance, a.opaque, a.placement, a.primitive) <
+         std::tie(b.distance, b.opaque, b.placement, b.primitive);
+}
+
+/// By place, not by number: meshes with a normal or texture coordinate per face have several
+/// vertices at one place.
+bool ShareVertex(const GeometryView& g, const Placement& p, uint32_t a, uint32_t b) {
+  const auto corner = [&](uint32_t triangle, uint32_t k) {
+    const uint32_t vertex = g.indices[static_cast<uint32_t>(p.first_index) + 3 * triangle + k];
+    return g.floats + p.positions + 3 * static_cast<size_t>(vertex);
+  };
+  for (uint32_t i = 0; i < 9; ++i) {
+    if (std::memcmp(corner(a, i / 3), corner(b, i % 3), 3 * sizeof(float)) == 0) return true;
+  }
+  return false;
+}
+
+/// Is hit `i` met by a neighbour earlier in the list, at most `reach` before it?
+bool IsRepeated(const GeometryView& g, std::span<const LayerHit> hits, size_t i, float reach) {
+  const LayerHit& hit = hits[i];
+  if (hit.opaque) return false;
+  for (size_t k = i; k-- > 0 && std::abs(hit.distance - hits[k].distance) <= reach;) {
+    if (hits[k].placement != hit.placement) continue;
+    if (hits[k].primitive == hit.primitive ||
+        ShareVertex(g, g.placements[hit.placement], hits[k].primitive, hit.primitive)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void Gather(const TraceLevel& level, bool opaque, RTCRay ray, std::vector<LayerHit>& hits) {
+  if (level.scene == nullptr) return;
+  EmbreeGather1(level.scene, &ray, [&level, opaque, &hits](const RTCHit& hit, float distance) {
+    hits.push_back({distance, PlacementOf(level, hit.instID[0], hit.geomID), hit.primID, hit.u,
+                    hit.v, opaque});
+  });
+}
+
+/// Scratch of this thread.
+std::vector<LayerHit>& Scratch() {
+  thread_local std::vector<LayerHit> hits;
+  hits.clear();
+  return hits;
+}
+
+float Reach(const float origin[3], float distance) {
+  const float most =
+      std::max({std::abs(origin[0]), std::abs(origin[1]), std::abs(origin[2]), distance});
+  return most * 0x1p-20f;
+}
+
+}  // namespace
+
+void SetRay(RTCRay& ray, const float origin[3], const float direction[3], float tnear, float tfar) {
+  ray.org_x = origin[0];
+  ray.org_y = origin[1];
+  ray.org_z = origin[2];
+  ray.dir_x = direction[0];
+  ray.dir_y = direction[1];
+  ray.dir_z = direction[2];
+  ray.tnear = tnear;
+  ray.tfar = tfar;
+  ray.time = 0;
+  ray.mask = ~0u;
+  ray.id = 0;
+  ray.flags = 0;
+}
+
+int32_t PlacementOf(const TraceLevel& level, unsigned instance, unsigned geometry) {
+  if (instance == RTC_INVALID_GEOMETRY_ID) return level.top[geometry];
+  return level.nested[level.top[instance] + static_cast<int32_t>(geometry)];
+}
+
+float LayerReach(const PathState& path) {
+  return Reach(path.origin, path.first_layer.distance);
+}
+
+bool NextLayerHere(const TraceView& view, PathState& path) {
+  const LayerMark& first = path.first_layer;
+  const float reach = LayerReach(path);
+  RTCRay ray;
+  SetRay(ray, path.origin, path.direction, std::max(path.tnear, first.distance - reach),
+         first.distance + reach);
+  std::vector<LayerHit>& hits = Scratch();
+  hits.push_back({first.distance, first.placement, first.primitive, 0, 0, false});
+  Gather(view.transparent, false, ray, hits);
+  Gather(view.opaque, true, ray, hits);
+  const auto is_first = [&](const LayerHit& hit) {
+    return SameTriangle(hit, first.placement, first.primitive);
+  };
+  hits.erase(std::remove_if(hits.begin() + 1, hits.end(), is_first), hits.end());
+  std::sort(hits.begin() + 1, hits.end(), Before);
+
+  const auto last = std::find_if(hits.begin(), hits.end(), [&](const LayerHit& hit) {
+    return SameTriangle(hit, path.placement, path.primitive);
+  });
+  if (last == hits.end()) return false;
+  for (size_t i = static_cast<size_t>(last - hits.begin()) + 1; i < hits.size(); ++i) {
+    if (IsRepeated(view.geometry, hits, i, 2 * reach)) continue;
+    const LayerHit& hit = hits[i];
+    path.placement = hit.placement;
+    path.primitive = hit.primitive;
+    path.u = hit.u;
+    path.v = hit.v;
+    path.distance = hit.distance;
+    return true;
+  }
+  return false;
+}
+
+std::span<const LayerHit> ShadowLayers(const TraceView& view, const PathState& path) {
+  RTCRay ray;
+  SetRay(ray, path.origin, path.shadow_direction, 0, path.shadow_distance);
+  std::vector<LayerHit>& hits = Scratch();
+  Gather(view.transparent, false, ray, hits);
+  if (hits.size() > kMaxAlphaLayers) return hits;
+  std::sort(hits.begin(), hits.end(), Before);
+  thread_local std::vector<LayerHit> once;
+  once.clear();
+  for (size_t i = 0; i < hits.size(); ++i) {
+    if (!IsRepeated(view.geometry, hits, i, Reach(path.origin, hits[i].distance)))
+      once.push_back(hits[i]);
+  }
+  return once;
+}
+
+}  // namespace carpool::stages

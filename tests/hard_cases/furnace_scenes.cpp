@@ -1,0 +1,68 @@
+// Furnaces: inside or under uniform light, what returns is known for any shape.
+#include <cmath>
+
+#include "tests/hard_cases/scenes.h"
+
+namespace carpool::test {
+namespace {
+
+/// Inside a closed Lambert box that glows: L = Le (1 - rho^(k+1)) / (1 - rho) after k scattering
+/// events.
+ClosedForm ClosedFurnace(int depth) {
+  const double rho = 0.8, emission = 0.5;
+  SceneCase c{.name = "row12_furnace_depth_" + std::to_string(depth)};
+  SceneBuilder& b = c.scene;
+  b.PlaceMesh(b.AddBox(1, b.AddLambert({rho, rho, rho}, {emission, emission, emission}), true));
+  b.AddCamera({0.1, 0.2, 0.3}, 1.2);
+  c.settings = HardSettings(depth > 5 ? 256 : 64, depth);
+  return {12, c, {.expected = emission * (1 - std::pow(rho, depth + 1)) / (1 - rho)}};
+}
+
+/// A surface that reflects all light vanishes before a white sky. The code declares how far each
+/// (mu, roughness) may be off: 0.002.
+ClosedForm WhiteSphere(double metallic, double roughness) {
+  SceneCase c{.name = "row16_white_" + std::string(metallic > 0 ? "metal" : "dielectric") + "_" +
+                      std::to_string(static_cast<int>(100 * roughness))};
+  SceneBuilder& b = c.scene;
+  b.PlaceMesh(b.AddSphere(1, 48, AddWhite(b, metallic, roughness), false));
+  b.AddCamera({0, 0, 4}, 0.3);
+  c.settings = HardSettings(roughness < 0.5 ? 128 : 384, 32);
+  c.sky = UniformSky(1);
+  return {16, c, {.expected = 1, .slack = 0.002}};
+}
+
+/// rho = 0.99: paths of hundreds of vertices, with and without Russian roulette.
+ClosedForm LongPaths(int roulette) {
+  const double rho = 0.99;
+  SceneCase c{.name = "row44_roulette_from_" + std::to_string(roulette)};
+  SceneBuilder& b = c.scene;
+  b.PlaceMesh(b.AddBox(1, b.AddLambert({rho, rho, rho}, {1, 1, 1}), true));
+  b.AddCamera({0.1, 0.2, 0.3}, 1.2);
+  c.settings = HardSettings(roulette > 3 ? 4 : 32, render::kMaxDepth);
+  c.settings.roulette_depth = roulette;
+  return {44,
+          c,
+          {.expected = (1 - std::pow(rho, render::kMaxDepth + 1)) / (1 - rho), .precision = 0.05}};
+}
+
+}  // namespace
+
+int AddWhite(SceneBuilder& b, double metallic, double roughness) {
+  return b.AddMaterial({{"pbrMetallicRoughness",
+                         {{"baseColorFactor", {1, 1, 1, 1}},
+                          {"metallicFactor", metallic},
+                          {"roughnessFactor", roughness}}}});
+}
+
+std::vector<ClosedForm> FurnaceForms() {
+  std::vector<ClosedForm> forms;
+  for (const int depth : {0, 1, 2, 5, 60}) forms.push_back(ClosedFurnace(depth));
+  for (const double metallic : {0.0, 1.0}) {
+    for (const double roughness : {0.0, 0.1, 0.3, 0.7, 1.0})
+      forms.push_back(WhiteSphere(metallic, roughness));
+  }
+  for (const int roulette : {0, 3, 256}) forms.push_back(LongPaths(roulette));
+  return forms;
+}
+
+}  // namespace carpool::test
