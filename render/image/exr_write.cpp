@@ -22,7 +22,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "render/image/atomic_file.h"
+#include "render/posix/atomic_file.h"
 #include "render/image/exr_memory.h"
 #include "render/image/exr_reserved.h"
 

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "render/base/error.h"
-#include "render/image/atomic_file.h"
+#include "render/posix/atomic_file.h"
 
 namespace carpool::render {
 namespace {

@@ -4,7 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include "render/film/resolve.h"
-#include "render/image/atomic_file.h"
+#include "render/posix/atomic_file.h"
 #include "render/image/exr_write.h"
 #include "render/image/png_write.h"
 #include "render/image/tonemap.h"

@@ -6,7 +6,7 @@
 #include <chrono>
 
 #include "render/film/resolve.h"
-#include "render/image/atomic_file.h"
+#include "render/posix/atomic_file.h"
 #include "render/session/output.h"
 #include "render/session/workspace.h"
 

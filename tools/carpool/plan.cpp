@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "render/image/atomic_file.h"
+#include "render/posix/atomic_file.h"
 #include "render/plan/plan.h"
 #include "tools/carpool/commands.h"
 #include "tools/carpool/render_flags.h"

@@ -5,16 +5,18 @@
 #include <memory>
 #include <string>
 
+#include "render/posix/interrupt.h"
+#include "render/posix/terminal.h"
 #include "render/session/session.h"
 #include "tools/carpool/commands.h"
 #include "tools/carpool/render_flags.h"
-#include "tools/posix/interrupt.h"
-#include "tools/posix/terminal.h"
 
 namespace carpool::tools {
 namespace {
 
+using render::InterruptGuard;
 using render::ProgressStyle;
+using render::TerminalColumns;
 
 ProgressStyle StyleFor(bool quiet, int columns) {
   if (quiet) return ProgressStyle::silent;

@@ -1,6 +1,6 @@
 // Atomic replacement: the old contents survive every failure, links and modes stay, no temporary is
 // left.
-#include "render/image/atomic_file.h"
+#include "render/posix/atomic_file.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -1,5 +1,5 @@
-// See atomic_file.h. All POSIX calls of this folder are here.
-#include "render/image/atomic_file.h"
+// See atomic_file.h.
+#include "render/posix/atomic_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,10 +1,10 @@
 // The signal handlers behind InterruptGuard.
-#include "tools/posix/interrupt.h"
+#include "render/posix/interrupt.h"
 
 #include <unistd.h>
 #include <csignal>
 
-namespace carpool::tools {
+namespace carpool::render {
 namespace {
 
 constexpr int kSignals[] = {SIGINT, SIGTERM};
@@ -39,4 +39,4 @@ const std::atomic<bool>& InterruptGuard::Requested() const {
   return requested;
 }
 
-}  // namespace carpool::tools
+}  // namespace carpool::render

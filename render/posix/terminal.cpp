@@ -1,12 +1,12 @@
 // Asks the terminal behind standard error for its size.
-#include "tools/posix/terminal.h"
+#include "render/posix/terminal.h"
 
 #include <sys/ioctl.h>
 #include <unistd.h>
 #include <cstdlib>
 #include <string_view>
 
-namespace carpool::tools {
+namespace carpool::render {
 
 int TerminalColumns() {
   const char* kind = std::getenv("TERM");
@@ -16,4 +16,4 @@ int TerminalColumns() {
   return known ? size.ws_col : 80;
 }
 
-}  // namespace carpool::tools
+}  // namespace carpool::render

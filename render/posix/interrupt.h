@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-namespace carpool::tools {
+namespace carpool::render {
 
 /// While one lives, the first SIGINT or SIGTERM sets Requested(); a second one ends the process at
 /// once with exit code 130. At most one may live at a time.
@@ -17,4 +17,4 @@ class InterruptGuard {
   const std::atomic<bool>& Requested() const;
 };
 
-}  // namespace carpool::tools
+}  // namespace carpool::render
