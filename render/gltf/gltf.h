@@ -35,10 +35,12 @@ struct EncodedImage {
   std::string where;  // "FILE: /images/3 (wood.png)", for messages
 };
 
-/// One `stages::Texture` to be decoded: an image in a colour space. Each pair occurs once.
+/// One `stages::Texture` to be decoded: an image as it is used. Each combination occurs once.
 struct TextureSource {
   int image = 0;
   bool srgb = false;
+  bool coverage = false;  // alpha says how much of a texel is there (MASK, BLEND base colour)
+  auto operator<=>(const TextureSource&) const = default;
 };
 
 struct CameraNode {

@@ -19,8 +19,8 @@ class MaterialReader {
         pointer_(Pointer("materials", index)) {}
 
   stages::Material Read() {
-    ReadBase();
     ReadAlpha();
+    ReadBase();  // its alpha is coverage unless the mode is OPAQUE
     if (Extension(json_, "KHR_materials_unlit")) {
       // Only the base colour counts; whatever else the material has is for readers without the
       // extension.
@@ -44,11 +44,11 @@ class MaterialReader {
   void ReadIor();
   void ReadSpecular();
 
-  void SetSlot(Slot slot, const Json& owner, const char* key, bool srgb,
+  void SetSlot(Slot slot, const Json& owner, const char* key, const TextureSource& use,
                const std::string& pointer) {
     if (!owner.contains(key)) return;
     material_.slots[static_cast<int>(slot)] =
-        textures_.AddSlot(owner[key], srgb, pointer + "/" + key, needs.uv_sets);
+        textures_.AddSlot(owner[key], use, pointer + "/" + key, needs.uv_sets);
   }
 
   /// `value`, or the nearest one in range with a warning.
@@ -69,6 +69,7 @@ class MaterialReader {
 };
 
 constexpr double kHuge = 3e38;
+constexpr TextureSource kColor{.srgb = true}, kData{.srgb = false};
 
 void MaterialReader::ReadBase() {
   const Json& pbr = Child(json_, "pbrMetallicRoughness");
@@ -76,7 +77,8 @@ void MaterialReader::ReadBase() {
   const auto color = Numbers<4>(pbr, "baseColorFactor", {1, 1, 1, 1});
   for (int i = 0; i < 4; ++i)
     material_.base_color[i] = InRange(color[i], 0, 1, pointer + "/baseColorFactor");
-  SetSlot(Slot::base_color, pbr, "baseColorTexture", true, pointer);
+  SetSlot(Slot::base_color, pbr, "baseColorTexture",
+          {.srgb = true, .coverage = material_.alpha_mode != stages::AlphaMode::opaque}, pointer);
   if (Get(json_, "doubleSided", false)) material_.flags |= stages::kMaterialDoubleSided;
 }
 
@@ -95,8 +97,8 @@ void MaterialReader::ReadReflection() {
   material_.metallic = InRange(Get(pbr, "metallicFactor", 1.0), 0, 1, pointer + "/metallicFactor");
   material_.roughness =
       InRange(Get(pbr, "roughnessFactor", 1.0), 0, 1, pointer + "/roughnessFactor");
-  SetSlot(Slot::metallic_roughness, pbr, "metallicRoughnessTexture", false, pointer);
-  SetSlot(Slot::normal, json_, "normalTexture", false, pointer_);
+  SetSlot(Slot::metallic_roughness, pbr, "metallicRoughnessTexture", kData, pointer);
+  SetSlot(Slot::normal, json_, "normalTexture", kData, pointer_);
   material_.normal_scale = static_cast<float>(Get(Child(json_, "normalTexture"), "scale", 1.0));
   needs.tangents = material_.slots[static_cast<int>(Slot::normal)] != stages::kNone;
 }
@@ -115,7 +117,7 @@ void MaterialReader::ReadEmission() {
   }
   // Without emission its texture can never be seen, so it is not loaded either.
   if (material_.flags & stages::kMaterialEmissive)
-    SetSlot(Slot::emissive, json_, "emissiveTexture", true, pointer_);
+    SetSlot(Slot::emissive, json_, "emissiveTexture", kColor, pointer_);
 }
 
 void MaterialReader::ReadIor() {
@@ -141,8 +143,8 @@ void MaterialReader::ReadSpecular() {
   for (int i = 0; i < 3; ++i) {
     material_.specular_color[i] = InRange(color[i], 0, kHuge, pointer + "/specularColorFactor");
   }
-  SetSlot(Slot::specular, *extension, "specularTexture", false, pointer);
-  SetSlot(Slot::specular_color, *extension, "specularColorTexture", true, pointer);
+  SetSlot(Slot::specular, *extension, "specularTexture", kData, pointer);
+  SetSlot(Slot::specular_color, *extension, "specularColorTexture", kColor, pointer);
 }
 
 }  // namespace

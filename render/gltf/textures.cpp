@@ -58,15 +58,14 @@ int CompactSet(int set, std::vector<int>& sets) {
 
 }  // namespace
 
-int TextureCollector::AddSource(int image, bool srgb) {
-  const auto [found, is_new] =
-      source_of_.try_emplace({image, srgb}, static_cast<int>(sources.size()));
-  if (is_new) sources.push_back({image, srgb});
-  image_used_[image] = true;
+int TextureCollector::AddSource(const TextureSource& source) {
+  const auto [found, is_new] = source_of_.try_emplace(source, static_cast<int>(sources.size()));
+  if (is_new) sources.push_back(source);
+  image_used_[source.image] = true;
   return found->second;
 }
 
-int TextureCollector::AddSlot(const Json& info, bool srgb, const std::string& pointer,
+int TextureCollector::AddSlot(const Json& info, TextureSource use, const std::string& pointer,
                               std::vector<int>& uv_sets) {
   const int index = info["index"];
   const Json& texture = document_.Items("textures")[index];
@@ -76,7 +75,8 @@ int TextureCollector::AddSlot(const Json& info, bool srgb, const std::string& po
     return stages::kNone;
   }
   stages::TextureSlot slot;
-  slot.texture = AddSource(texture["source"], srgb);
+  use.image = texture["source"];
+  slot.texture = AddSource(use);
   int set = Get(info, "texCoord", 0);
   if (const Json* transform = Extension(info, "KHR_texture_transform")) {
     SetTransform(*transform, slot);

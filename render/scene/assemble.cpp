@@ -35,7 +35,7 @@ void MakeTextures(const ImportedScene& imported, SceneTables& tables, const Warn
   for (const EncodedImage& image : imported.images) images.push_back({image.bytes, image.where});
   std::vector<TextureSourceView> sources;
   for (const TextureSource& source : imported.texture_sources)
-    sources.push_back({source.image, source.srgb});
+    sources.push_back({source.image, source.srgb, source.coverage});
   BuildTextures(images, sources, tables.textures, warn);
 }
 

@@ -115,6 +115,22 @@ TEST(Material, AllSlotsWithTheirColourSpaces) {
   EXPECT_NE(imported.geometry.shapes.at(0).tangents, kNone);
 }
 
+TEST(Material, AlphaIsCoverageOnlyForTheBaseColourOfWhatIsNotOpaque) {
+  const Json info = {{"index", 0}};
+  const auto sources = [&](const char* mode) {
+    return Load(WithMaterial({{"alphaMode", mode},
+                              {"pbrMetallicRoughness", {{"baseColorTexture", info}}},
+                              {"emissiveTexture", info},
+                              {"emissiveFactor", {1, 1, 1}}}))
+        .texture_sources;
+  };
+  EXPECT_EQ(sources("OPAQUE"), (std::vector<TextureSource>{{.srgb = true}}));
+  for (const char* mode : {"MASK", "BLEND"}) {
+    EXPECT_EQ(sources(mode),
+              (std::vector<TextureSource>{{.srgb = true, .coverage = true}, {.srgb = true}}));
+  }
+}
+
 TEST(Material, TexturesThatCannotBeSeenAreNotLoaded) {
   SceneBuilder scene =
       WithMaterial({{"emissiveTexture", {{"index", 0}}}, {"occlusionTexture", {{"index", 0}}}});
