@@ -96,6 +96,16 @@ stages::KernelContext MakeContext(const PreparedScene& scene, const Plan& plan,
   return c;
 }
 
+stages::ExecutorOptions ExecutorOptionsFor(const RenderSettings& settings, Threads& threads) {
+  stages::ExecutorOptions options;
+  options.arena = &threads.arena();
+  options.threads = static_cast<uint32_t>(threads.count());
+  options.memory_bytes = MemoryBytes(settings, threads.count());
+  options.batch_items = static_cast<uint32_t>(settings.batch_items);
+  options.policy = SchedulerPolicy(settings.policy);
+  return options;
+}
+
 Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Threads& threads)
     : scene_(std::move(scene)),
       plan_(MakePlan(scene_, settings)),
@@ -105,12 +115,7 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
       context_(MakeContext(scene_, plan_, settings)) {
   context_.trace = bvh_.View();
   context_.film = &film_;
-  stages::ExecutorOptions options;
-  options.arena = &threads.arena();
-  options.threads = static_cast<uint32_t>(threads.count());
-  options.memory_bytes = MemoryBytes(settings, threads.count());
-  options.batch_items = static_cast<uint32_t>(settings.batch_items);
-  options.policy = SchedulerPolicy(settings.policy);
+  const stages::ExecutorOptions options = ExecutorOptionsFor(settings, threads);
   executor_ =
       plan_.executor == Executor::megakernel
           ? stages::MakeMegakernel(context_, kernels_, options)

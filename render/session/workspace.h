@@ -40,6 +40,9 @@ PreparedScene LoadScene(const RenderSettings& settings, const WarningSink& warn)
 stages::KernelContext MakeContext(const PreparedScene& scene, const Plan& plan,
                                   const RenderSettings& settings);
 
+/// What executors are told of the machine: threads, memory, batches, policy.
+stages::ExecutorOptions ExecutorOptionsFor(const RenderSettings& settings, Threads& threads);
+
 /// Owns what an executor borrows; not movable, since pointers into it are everywhere.
 class Workspace {
  public:

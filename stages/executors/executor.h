@@ -35,6 +35,8 @@ struct ExecutorOptions {
   uint64_t memory_bytes = uint64_t{64} << 20;  // for path state and queues (wavefront)
   uint32_t batch_items = 0;                    // 0: each stage's own
   Policy policy = Policy::deepest_first();
+  bool bins = true;  // wavefront: false puts all materials and depths in one queue ...
+  bool simd = true;  // ... and shades one lane at a time
 };
 
 /// What one pass did.
@@ -44,6 +46,9 @@ struct PassReport {
   bool stopped = false;      // ended early: samples of some pixels of this pass are missing
   RunReport schedule;        // of the stage graph; empty for executors without one
   uint64_t state_bytes = 0;  // path state
+  double run_length = 1;     // items per call of the shading kernel
+  double seats_filled = 0;   // SIMD lanes used while shading / lanes of the instruction set, 0..1
+  double idle_seconds = 0;   // of all threads together, without anything to do
 };
 
 /// Renders passes into the film of its context. The samples a pass adds, and their values, do not

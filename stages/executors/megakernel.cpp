@@ -7,6 +7,8 @@
 #include <array>
 #include <chrono>
 
+#include "stages/executors/busy_clock.h"
+#include "stages/executors/camera_group.h"
 #include "stages/executors/executor.h"
 #include "stages/simd/denormals.h"
 
@@ -19,6 +21,7 @@ class Megakernel final : public Executor {
       : c_(context), kernels_(kernels.one), opacity_{&context, kernels.opacity}, options_(options) {
     // Camera rays come in packets anyway, so they may be made at full width.
     camera_ = kernels.wide.camera;
+    wide_lanes_ = kernels.wide.lanes;
   }
 
   std::string_view name() const override { return "megakernel"; }
@@ -32,7 +35,8 @@ class Megakernel final : public Executor {
 
   const KernelContext& c_;
   KernelSet kernels_;
-  void (*camera_)(const KernelContext&, PathState*, std::span<const uint32_t>);
+  CameraKernel camera_;
+  int wide_lanes_ = 1;
   OpacityQuery opacity_;
   ExecutorOptions options_;
 };
@@ -61,21 +65,9 @@ void Megakernel::FollowPath(PathState* paths, uint32_t slot, RayCounts& rays) co
 
 void Megakernel::RenderPacket(const CameraPacket& packet, RayCounts& rays) const {
   std::array<PathState, 8> paths;
-  std::array<PathState*, 8> group = {};
-  std::array<uint32_t, 8> slots;
-  size_t count = 0;
-  for (uint32_t i = 0; i < 8; ++i) {
-    const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
-    if (x >= c_.width || y >= c_.height) continue;
-    paths[i].pixel = y * c_.width + x;
-    paths[i].sample = packet.sample;
-    group[i] = &paths[i];
-    slots[count++] = i;
-  }
-  camera_(c_, paths.data(), {slots.data(), count});
-  IntersectPacket(c_.trace, group.data());
-  rays.camera += count;
-  for (size_t i = 0; i < count; ++i) FollowPath(paths.data(), slots[i], rays);
+  const CameraGroup group = TraceCameraGroup(c_, camera_, packet, paths.data(), 0);
+  rays.camera += group.count;
+  for (size_t i = 0; i < group.count; ++i) FollowPath(paths.data(), group.slots[i], rays);
 }
 
 PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& stop,
@@ -84,11 +76,13 @@ PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& s
   CameraWork work(c_.width, c_.height, pass);
   tbb::enumerable_thread_specific<RayCounts> tallies;
   std::atomic<bool> reporting{false};
+  BusyClock clock(options_.threads);
 
   // Each body keeps claiming the groups of one tile at one sample until none is left: dynamic
   // balance, no barrier.
   const auto worker = [&](size_t) {
     const FlushDenormals denormals;
+    const BusyClock::Scope busy(clock);
     RayCounts& rays = tallies.local();
     bool more = true;
     while (more && !stop.load(std::memory_order_relaxed)) {
@@ -105,6 +99,8 @@ PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& s
   for (const RayCounts& rays : tallies) report.rays += rays;
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.stopped = work.Fraction() < 1;
+  report.seats_filled = 1.0 / wide_lanes_;
+  report.idle_seconds = clock.Idle(report.seconds);
   report.state_bytes = uint64_t{options_.threads} * 8 * sizeof(PathState);
   return report;
 }

@@ -32,9 +32,10 @@ uint32_t PathsInFlight(const ExecutorOptions& options) {
   return static_cast<uint32_t>(std::clamp<uint64_t>(fitting, 1024, 65536));
 }
 
-std::vector<int32_t> Materials(std::span<const Placement> placements) {
+/// The material of each placement, or none but the first where bins are not wanted.
+std::vector<int32_t> Materials(std::span<const Placement> placements, bool bins) {
   std::vector<int32_t> materials;
-  for (const Placement& placement : placements) materials.push_back(placement.material);
+  for (const Placement& placement : placements) materials.push_back(bins ? placement.material : 0);
   return materials;
 }
 
@@ -49,13 +50,14 @@ class Wavefront final : public Executor {
   Wavefront(const KernelContext& context, const Kernels& kernels,
             std::span<const Placement> placements, const ExecutorOptions& options)
       : c_(context),
-        kernels_(kernels.wide),
+        kernels_(options.simd ? kernels.wide : kernels.one),
+        wide_lanes_(kernels.wide.lanes),
         opacity_{&context, kernels.opacity},
-        material_of_placement_(Materials(placements)),
+        material_of_placement_(Materials(placements, options.bins)),
         options_(options),
         in_flight_(PathsInFlight(options)),
-        bins_(MaterialCount(material_of_placement_), context.max_depth, in_flight_,
-              BlockItems(options, 256)),
+        bins_(MaterialCount(material_of_placement_), options.bins ? context.max_depth : 0,
+              in_flight_, BlockItems(options, 256)),
         pool_(in_flight_, options.threads),
         paths_(pool_.capacity()),
         tallies_(options.threads) {
@@ -90,6 +92,7 @@ class Wavefront final : public Executor {
 
   const KernelContext& c_;
   KernelSet kernels_;
+  int wide_lanes_;
   OpacityQuery opacity_;
   std::vector<int32_t> material_of_placement_;  // 4 bytes a placement instead of its whole record
   ExecutorOptions options_;
@@ -273,6 +276,12 @@ PassReport Wavefront::Render(const CameraPass& pass, const std::atomic<bool>& st
   report.seconds = report.schedule.seconds;
   report.stopped = work.Fraction() < 1;
   report.state_bytes = paths_.size() * sizeof(PathState);
+  for (const StageReport& stage : report.schedule.stages) {
+    if (stage.name != "shade") continue;
+    report.run_length = stage.run_length;
+    report.seats_filled = stage.seats_filled * kernels_.lanes / wide_lanes_;
+  }
+  report.idle_seconds = report.schedule.idle_seconds;
   work_ = nullptr;
   return report;
 }

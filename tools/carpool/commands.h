@@ -25,5 +25,6 @@ void Warn(const std::string& line);
 Command RenderCommand(CLI::App& program);
 Command PlanCommand(CLI::App& program);
 Command InfoCommand(CLI::App& program);
+Command LadderCommand(CLI::App& program);
 
 }  // namespace carpool::tools

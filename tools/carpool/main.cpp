@@ -57,7 +57,7 @@ ExitCode Main(int argc, char** argv) {
   program.set_version_flag("--version", "carpool " CARPOOL_VERSION);
   program.require_subcommand(1);
   const std::vector<Command> commands = {RenderCommand(program), PlanCommand(program),
-                                         InfoCommand(program)};
+                                         InfoCommand(program), LadderCommand(program)};
   const ExitCode code = Run(program, commands, argc, argv);
   if (std::fflush(stdout) != 0) throw render::OutputError("standard output", "cannot be written");
   return code;

@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "render/posix/atomic_file.h"
 #include "render/plan/plan.h"
+#include "render/posix/atomic_file.h"
 #include "tools/carpool/commands.h"
 #include "tools/carpool/render_flags.h"
 

@@ -78,17 +78,8 @@ void AddSceneFlags(CLI::App& command, RenderFlags& flags) {
                    "faster rays that may slip through where triangles meet");
 }
 
-void AddRunFlags(CLI::App& command, RenderFlags& flags) {
+void AddMachineFlags(CLI::App& command, RenderFlags& flags) {
   RenderSettings& s = flags.settings;
-  command.add_option("-o,--output", s.output_path, "the image, an .exr file")
-      ->required()
-      ->type_name("FILE.exr");
-  command.add_flag("--no-png", flags.no_png, "write no tone-mapped PNG beside the image");
-  command.add_option("--preview", s.preview_path, "a picture refreshed while rendering")
-      ->type_name("FILE.png");
-  command.add_option("--exposure", s.exposure, "brightens the PNGs by 2^EV, not the image")
-      ->type_name("EV");
-  command.add_option("--seed", s.seed, "another seed, another noise (default: 0)")->type_name("N");
   command.add_option("--threads", s.threads, "threads (default: all the process may use)")
       ->type_name("N");
   command.add_option("--memory", s.memory_mb, "MiB for path state and queues (default: by need)")
@@ -101,6 +92,20 @@ void AddRunFlags(CLI::App& command, RenderFlags& flags) {
       ->type_name("NAME");
   command.add_option("--isa", flags.isa, "instruction set: sse4, avx2, avx512 or auto (default)")
       ->type_name("NAME");
+}
+
+void AddRunFlags(CLI::App& command, RenderFlags& flags) {
+  RenderSettings& s = flags.settings;
+  command.add_option("-o,--output", s.output_path, "the image, an .exr file")
+      ->required()
+      ->type_name("FILE.exr");
+  command.add_flag("--no-png", flags.no_png, "write no tone-mapped PNG beside the image");
+  command.add_option("--preview", s.preview_path, "a picture refreshed while rendering")
+      ->type_name("FILE.png");
+  command.add_option("--exposure", s.exposure, "brightens the PNGs by 2^EV, not the image")
+      ->type_name("EV");
+  command.add_option("--seed", s.seed, "another seed, another noise (default: 0)")->type_name("N");
+  AddMachineFlags(command, flags);
   command.add_option("--stats", s.stats_path, "the run's report as JSON")->type_name("FILE.json");
   command.add_flag("--quiet", s.quiet, "say nothing but errors");
 }

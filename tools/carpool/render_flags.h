@@ -24,7 +24,10 @@ struct RenderFlags {
 /// AddSceneFlags adds what decides which work a render has: scene, view, image, length, executor.
 void AddSceneFlags(CLI::App& command, RenderFlags& flags);
 
-/// AddRunFlags adds the rest: where results go, and how the machine is used.
+/// AddMachineFlags adds how the machine is used: threads, memory, batches, policy, instruction set.
+void AddMachineFlags(CLI::App& command, RenderFlags& flags);
+
+/// AddRunFlags adds these, and where results go.
 void AddRunFlags(CLI::App& command, RenderFlags& flags);
 
 /// Settle returns the settings the flags ask for; throws Error(ExitCode::usage) for what makes no
