@@ -153,7 +153,7 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
       throw std::invalid_argument("carpool: a block of stage '" + from.options.name +
                                   "' is larger than 64 MiB; lower its block_items");
     }
-    build_ladder(stage, thrift);
+    build_ladder(stage, thrift, options.policy.kind() == Policy::Kind::fullest_first);
     for (std::uint32_t level = 0; level <= stage.top_level; ++level) {
       sizes.push_back(stage.levels[level].bytes);
     }
@@ -172,8 +172,11 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
 }
 
 // One item, four, sixteen, ..., the full block. Two items or more are told from one because where
-// keys are as many as items, choosing bins that hold two halves the number of batches.
-void Layout::build_ladder(StageLayout& stage, std::uint64_t thrift) const {
+// keys are as many as items, choosing bins that hold two halves the number of batches. Each step is
+// a branch that nobody foresees, which waits for the item's value and throws away the work on the
+// next items: where bins are so few that blocks begin at their full size, most become full, and
+// steps of sixteen do.
+void Layout::build_ladder(StageLayout& stage, std::uint64_t thrift, bool fine) const {
   const std::uint64_t full = round_up_to_line(std::uint64_t{stage.item_bytes} * stage.block_items);
   const std::uint64_t smallest = std::min(full, thrift / kLine * kLine);
   std::uint64_t items = 1;
@@ -192,7 +195,7 @@ void Layout::build_ladder(StageLayout& stage, std::uint64_t thrift) const {
       return;
     }
     least = static_cast<std::uint32_t>(items) + 1;
-    items *= 4;
+    items *= fine || smallest < full ? 4 : 16;
   }
 }
 

@@ -96,7 +96,7 @@ struct Layout {
   void set_weights(const Graph& graph);
   void order_by_rank(const Graph& graph);
   void build_levels(const Graph& graph, const RunOptions& options);
-  void build_ladder(StageLayout& stage, std::uint64_t thrift) const;
+  void build_ladder(StageLayout& stage, std::uint64_t thrift, bool fine) const;
   void limit_classes();
   std::uint32_t class_of(std::uint32_t bytes) const;
 };
