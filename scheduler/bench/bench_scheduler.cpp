@@ -1,15 +1,24 @@
 // bench-scheduler: what an item-visit costs here and elsewhere, all measured in one run.
 #include <algorithm>
-#include <array>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
+#include <functional>
+#include <limits>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
+#include "allocations.h"
 #include "carpool/carpool.h"
 #include "contestants.h"
+#include "memory.h"
+#include "prediction.h"
+#include "rows.h"
+#include "sssp.h"
+#include "transport.h"
 
 namespace {
 
@@ -17,52 +26,63 @@ using bench::Result;
 using bench::Setup;
 using bench::Work;
 
-struct Row {
-  std::string name;
-  double value;
-  std::string unit;
-  double target;  // NaN: none
-  bool holds;
-};
-
-std::vector<Row> rows;
-
-void add_row(const std::string& name, double value, const char* unit) {
-  rows.push_back({name, value, unit, __builtin_nan(""), true});
-}
-void add_at_most(const std::string& name, double value, const char* unit, double target) {
-  rows.push_back({name, value, unit, target, value <= target});
-}
-void add_at_least(const std::string& name, double value, const char* unit, double target) {
-  rows.push_back({name, value, unit, target, value >= target});
-}
+bench::Rows rows;
 
 struct Cost {
   double cpu_ns = 1e30;   // CPU time per visit
   double wall_ns = 1e30;  // wall time per visit
 };
 
-using Contestant = Result (*)(const Work&, const Setup&);
+using Contestant = std::function<Result(const Work&, const Setup&)>;
 
-// measure takes the best of several tries: on a shared machine the smallest time is the truest.
-Cost measure(Contestant run, const Work& work, const Setup& setup, const Result& expected,
-             int tries = 3) {
-  Cost best;
-  for (int i = 0; i < tries; ++i) {
-    const double cpu = bench::cpu_seconds();
-    const double wall = bench::wall_seconds();
-    const Result result = run(work, setup);
-    const double cpu_spent = bench::cpu_seconds() - cpu;
-    const double wall_spent = bench::wall_seconds() - wall;
-    if (result.sum != expected.sum || result.visits != expected.visits) {
-      std::fprintf(stderr, "bench-scheduler: a contestant did not do the work; this is a bug\n");
-      std::exit(1);
+const Contestant kCarpool = [](const Work& work, const Setup& setup) {
+  return bench::carpool_run(work, setup);
+};
+
+// run_once counts time and refuses a contestant that did not do the work.
+Cost run_once(Contestant run, const Work& work, const Setup& setup, const Result& expected) {
+  const double cpu = bench::cpu_seconds();
+  const double wall = bench::wall_seconds();
+  const Result result = run(work, setup);
+  const double cpu_spent = bench::cpu_seconds() - cpu;
+  const double wall_spent = bench::wall_seconds() - wall;
+  if (result.sum != expected.sum || result.visits != expected.visits) {
+    std::fprintf(stderr, "bench-scheduler: a contestant did not do the work; this is a bug\n");
+    std::exit(1);
+  }
+  const double visits = static_cast<double>(expected.visits);
+  return {.cpu_ns = cpu_spent / visits * 1e9, .wall_ns = wall_spent / visits * 1e9};
+}
+
+// measure lets the contestants take turns, and takes the best CPU time of each: on a shared machine
+// the smallest is the truest.
+std::vector<Cost> measure(const std::vector<Contestant>& contestants, const Work& work,
+                          const Setup& setup, const Result& expected, int rounds = 5) {
+  std::vector<Cost> best(contestants.size());
+  for (int round = 0; round < rounds; ++round) {
+    for (std::size_t i = 0; i < contestants.size(); ++i) {
+      const Cost cost = run_once(contestants[i], work, setup, expected);
+      best[i].cpu_ns = std::min(best[i].cpu_ns, cost.cpu_ns);
+      best[i].wall_ns = std::min(best[i].wall_ns, cost.wall_ns);
     }
-    const double visits = static_cast<double>(expected.visits);
-    best.cpu_ns = std::min(best.cpu_ns, cpu_spent / visits * 1e9);
-    best.wall_ns = std::min(best.wall_ns, wall_spent / visits * 1e9);
   }
   return best;
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+// wall_ratio is the median over rounds of wall time a / wall time b, each pair measured together.
+double wall_ratio(const std::function<Cost()>& a, const std::function<Cost()>& b, int rounds = 5) {
+  std::vector<double> ratios;
+  for (int round = 0; round < rounds; ++round) {
+    const double first = a().wall_ns;
+    ratios.push_back(first / b().wall_ns);
+  }
+  return median(ratios);
 }
 
 struct Keys {
@@ -85,33 +105,34 @@ void compare(double kernel_ns, int threads, Keys keys, bool rivals) {
                   .rounds = bench::rounds_for(kernel_ns)};
   const Setup setup{.threads = threads, .in_flight = 65536};
   const Result expected = bench::inlined_loop(work, setup);
-  const Cost loop = measure(bench::inlined_loop, work, setup, expected);
-  const Cost ours = measure(bench::carpool_run, work, setup, expected);
-  const Cost waves = measure(bench::waves, work, setup, expected);
+  const auto costs = measure({bench::inlined_loop, kCarpool, bench::waves}, work, setup, expected);
+  const double loop = costs[0].cpu_ns;
   const std::string suffix = label(keys, kernel_ns, threads);
-  add_row("loop, CPU per visit" + suffix, loop.cpu_ns, "ns");
-  add_at_most("carpool over loop" + suffix, ours.cpu_ns - loop.cpu_ns, "ns",
-              kernel_ns < 50 ? 3 : 0);
-  add_at_most("carpool over waves of 4k" + suffix, ours.cpu_ns - waves.cpu_ns, "ns", 3);
+  const std::string group = suffix.substr(2);
+  rows.add("loop, CPU per visit" + suffix, loop, "ns");
+  rows.at_most("carpool over loop" + suffix, costs[1].cpu_ns - loop, "ns", kernel_ns < 50 ? 3 : 0);
+  rows.at_most("carpool over waves of 4k" + suffix, costs[1].cpu_ns - costs[2].cpu_ns, "ns", 3);
+  rows.bar(group, "carpool", costs[1].cpu_ns - loop);
+  rows.bar(group, "waves of 4k", costs[2].cpu_ns - loop);
   if (rivals) {
     const auto rival = [&](const char* name, Contestant run) {
-      const Cost cost = measure(run, work, setup, expected, 1);
-      add_row(name + suffix, cost.cpu_ns - loop.cpu_ns, "ns");
+      const double cost = run_once(run, work, setup, expected).cpu_ns - loop;
+      rows.add(name + (" over loop" + suffix), cost, "ns");
+      rows.bar(group, name, cost);
     };
-    rival("flow_graph over loop", bench::flow_graph);
-    rival("feeder over loop", bench::feeder);
-    rival("task_group over loop", bench::task_group);
+    rival("flow_graph", bench::flow_graph);
+    rival("feeder", bench::feeder);
+    rival("task_group", bench::task_group);
   }
 }
 
 void few_items_many_keys() {
-  Work work{.items = 20'000, .keys = 1024, .rounds = bench::rounds_for(20)};
-  work.stages = 1;
+  const Work work{.items = 20'000, .stages = 1, .keys = 1024, .rounds = bench::rounds_for(20)};
   const Setup setup{.threads = 1, .in_flight = 1000};
   const Result expected = bench::inlined_loop(work, setup);
-  const Cost loop = measure(bench::inlined_loop, work, setup, expected);
-  const Cost ours = measure(bench::carpool_run, work, setup, expected);
-  add_at_most("1,000 items in 1,024 keys: carpool over loop", ours.cpu_ns - loop.cpu_ns, "ns", 40);
+  const auto costs = measure({bench::inlined_loop, kCarpool}, work, setup, expected, 9);
+  rows.at_most("1,000 items in 1,024 keys: carpool over loop", costs[1].cpu_ns - costs[0].cpu_ns,
+               "ns", 40);
 }
 
 void tables() {
@@ -121,114 +142,154 @@ void tables() {
   for (std::size_t i = 0; i < table.size(); ++i) {
     table[i] = bench::mix(i);
   }
-  Work work{.items = 300'000, .stages = 1, .keys = keys, .rounds = 16};
-  work.table = &table;
+  const Work work{.items = 300'000, .stages = 1, .keys = keys, .rounds = 16, .table = &table};
   const Setup setup{.threads = 1, .in_flight = 262144};
   const Result expected = bench::inlined_loop(work, setup);
-  const Cost loop = measure(bench::inlined_loop, work, setup, expected, 3);
-  const Cost ours = measure(bench::carpool_run, work, setup, expected, 3);
-  const Cost waves = measure(bench::waves, work, setup, expected, 3);
-  add_at_least("32 KiB table per key: loop / carpool", loop.cpu_ns / ours.cpu_ns, "x", 1.5);
-  add_at_least("32 KiB table per key: waves / carpool", waves.cpu_ns / ours.cpu_ns, "x", 1.5);
+  const auto costs =
+      measure({bench::inlined_loop, kCarpool, bench::waves}, work, setup, expected, 3);
+  rows.at_least("32 KiB table per key: loop / carpool", costs[0].cpu_ns / costs[1].cpu_ns, "x",
+                1.5);
+  rows.at_least("32 KiB table per key: waves / carpool", costs[2].cpu_ns / costs[1].cpu_ns, "x",
+                1.5);
 }
 
-void long_tail() {
-  Work work{.items = 100'000, .rounds = bench::rounds_for(100)};
-  work.long_tail = 1000;
+void long_tail(double kernel_ns) {
+  const Work work{
+      .items = 100'000, .stages = 1, .rounds = bench::rounds_for(kernel_ns), .long_tail = 1000};
   const Setup setup{.threads = 2, .in_flight = 65536};
   const Result expected = bench::inlined_loop(work, setup);
-  const Cost ours = measure(bench::carpool_run, work, setup, expected, 3);
-  const Cost waves = measure(bench::waves, work, setup, expected, 3);
-  add_at_least("long tail, 2 threads: waves / carpool, wall time", waves.wall_ns / ours.wall_ns,
-               "x", 1.5);
+  std::vector<double> idle;
+  const Contestant carpool = [&](const Work& w, const Setup& s) {
+    carpool::RunReport report;
+    const Result result = bench::carpool_run(w, s, report);
+    idle.push_back(100 * report.idle_seconds / (report.seconds * 2));
+    return result;
+  };
+  const double ratio = wall_ratio([&] { return run_once(bench::waves, work, setup, expected); },
+                                  [&] { return run_once(carpool, work, setup, expected); });
+  char name[96];
+  std::snprintf(name, sizeof name, "long tail, %g ns, 2 threads: ", kernel_ns);
+  rows.at_least(name + std::string("waves / carpool, wall time"), ratio, "x", 1.5);
+  rows.at_most(name + std::string("idle worker time"), median(idle), "%", 3);
 }
 
 void scaling() {
-  Work work{.items = 60'000, .rounds = bench::rounds_for(500)};
+  const Work work{.items = 60'000, .stages = 1, .rounds = bench::rounds_for(500)};
   const Result expected = bench::inlined_loop(work, {.threads = 1});
-  const Cost one = measure(bench::carpool_run, work, {.threads = 1}, expected, 3);
-  const Cost two = measure(bench::carpool_run, work, {.threads = 2}, expected, 3);
-  add_at_least("2 threads / 1 thread at 500 ns", one.wall_ns / two.wall_ns, "x", 1.9);
+  const auto scaled = [&](const Contestant& run) {
+    return wall_ratio([&] { return run_once(run, work, {.threads = 1}, expected); },
+                      [&] { return run_once(run, work, {.threads = 2}, expected); });
+  };
+  rows.add("2 threads / 1 thread at 500 ns: loop, which this machine allows",
+           scaled(bench::inlined_loop), "x");
+  rows.at_least("2 threads / 1 thread at 500 ns: carpool", scaled(kCarpool), "x", 1.9);
 }
 
-// One item in 64 out, a hundred thousand times: memory stays within the formula.
-void fan_out() {
+// Four times the work must not take more allocations: a slab or two at most.
+void allocations() {
+  Work work{.items = 50'000, .rounds = 1};
+  const Setup setup{.threads = 1, .in_flight = 16384};
+  const auto count = [&](std::uint64_t items) {
+    work.items = items;
+    const std::uint64_t before = carpool_test::allocation_count();
+    bench::carpool_run(work, setup);
+    return static_cast<double>(carpool_test::allocation_count() - before);
+  };
+  count(50'000);  // whatever is set up once per process
+  const double fewer = count(50'000);
+  rows.at_most("allocations: 1.6 M more item-visits take so many more", count(250'000) - fewer, "",
+               8);
+}
+
+// One item in 64 out: memory stays within the formula, and what others take beside it. Before any
+// thread has been started: see peak_bytes.
+void fan_out(bool quick) {
+  const std::uint32_t roots = quick ? 15'625 : 1'562'500;
+  const char* const name = quick ? "1 in, 64 out, 1e6 items: " : "1 in, 64 out, 1e8 items: ";
+  const std::size_t ours = bench::peak_bytes([&] {
+    carpool::RunReport report;
+    bench::carpool_fan_out(roots, 2, report);
+  });
+  const std::size_t theirs = bench::peak_bytes([&] { bench::flow_graph_fan_out(roots, 2); });
+  rows.add(name + std::string("resident memory, carpool"), static_cast<double>(ours) / 1024, "KiB");
+  rows.add(name + std::string("resident memory, flow_graph"), static_cast<double>(theirs) / 1024,
+           "KiB");
+}
+
+void fan_out_formula() {
+  carpool::RunReport report;
+  bench::carpool_fan_out(100'000, 2, report);
+  rows.at_most(
+      "1 in, 64 out: peak memory of blocks and tables / formula",
+      static_cast<double>(report.peak_bytes) / static_cast<double>(report.worst_case_bytes), "x",
+      1);
+}
+
+// A stage that blocks: what waiting for it costs, in time of the processor.
+void waiting() {
   carpool::Graph graph;
-  const auto split = graph.add_stage<std::uint32_t>({.name = "split", .rank = 0});
-  const auto leaf = graph.add_stage<std::uint32_t>({.name = "leaf", .rank = 1, .weight = 1});
-  graph.set_kernel(split, [&](const carpool::Batch<std::uint32_t>& batch, carpool::Emitter& out) {
-    for (const std::uint32_t item : batch.items) {
-      for (std::uint32_t i = 0; i < 64; ++i) {
-        out.emit(leaf, 0, item + i);
-      }
-    }
+  const auto wait =
+      graph.add_stage<int>({.name = "wait", .block_items = 1, .concurrency = 2, .blocking = true});
+  graph.set_kernel(wait, [](const carpool::Batch<int>&, carpool::Emitter&) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
   });
-  std::array<Result, 2> sums;
-  graph.set_kernel(leaf, [&](const carpool::Batch<std::uint32_t>& batch, carpool::Emitter&) {
-    for (const std::uint32_t item : batch.items) {
-      sums[batch.worker].sum += item;
-    }
+  int next = 0;
+  graph.add_source({.name = "requests"}, [&](carpool::SourceContext&, carpool::Emitter& out) {
+    out.emit(wait, 0, next);
+    return ++next < 50 ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
   });
-  std::uint32_t next = 0;
-  graph.add_source(
-      {.name = "roots", .fan_out = 64}, [&](carpool::SourceContext& ctx, carpool::Emitter& out) {
-        for (std::uint32_t i = 0; i < ctx.budget && next < 100'000; ++i, ++next) {
-          out.emit(split, 0, next);
-        }
-        return next < 100'000 ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
-      });
-  const carpool::RunReport report = carpool::run(graph, {.threads = 2, .in_flight = 16384});
-  add_at_most("1 in, 64 out, 6.4 M items: peak memory / formula",
-              static_cast<double>(report.peak_bytes) / static_cast<double>(report.worst_case_bytes),
-              "x", 1);
-  add_row("1 in, 64 out, 6.4 M items: peak memory", static_cast<double>(report.peak_bytes) / 1024,
-          "KiB");
+  const double cpu = bench::cpu_seconds();
+  const double wall = bench::wall_seconds();
+  carpool::run(graph, {.threads = 2});
+  rows.at_most("waiting for a stage that blocks: share of one core",
+               100 * (bench::cpu_seconds() - cpu) / (bench::wall_seconds() - wall), "%", 1);
 }
 
-void print_table() {
-  std::printf("%-58s %10s %-4s %8s\n", "", "value", "unit", "target");
-  for (const Row& row : rows) {
-    if (row.target == row.target) {
-      std::printf("%-58s %10.2f %-4s %8.2f %s\n", row.name.c_str(), row.value, row.unit.c_str(),
-                  row.target, row.holds ? "holds" : "MISSED");
-    } else {
-      std::printf("%-58s %10.2f %-4s\n", row.name.c_str(), row.value, row.unit.c_str());
-    }
-  }
+double seconds_of(const std::function<void()>& work) {
+  const double begin = bench::wall_seconds();
+  work();
+  return bench::wall_seconds() - begin;
 }
 
-bool write_json(const char* path) {
-  std::ofstream out(path);
-  out << "[\n";
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const Row& row = rows[i];
-    out << "  {\"name\": \"" << row.name << "\", \"value\": " << row.value << ", \"unit\": \""
-        << row.unit << "\", \"target\": ";
-    if (row.target == row.target) {
-      out << row.target;
-    } else {
-      out << "null";
-    }
-    out << ", \"holds\": " << (row.holds ? "true" : "false")
-        << (i + 1 < rows.size() ? "},\n" : "}\n");
-  }
-  out << "]\n";
-  return static_cast<bool>(out.flush());
+// The examples against what one would write with oneTBB alone.
+void twins(bool quick) {
+  const auto ratio = [&](const std::function<void()>& plain, const std::function<void()>& ours) {
+    const double first = seconds_of(plain);  // once: these runs are long
+    return first / seconds_of(ours);
+  };
+  const std::uint32_t histories = quick ? 100'000 : 10'000'000;
+  const transport::Slab slab(
+      {{.end = 1, .sigma = 1, .scattering = 0.9},
+       {.end = std::numeric_limits<double>::infinity(), .sigma = 2, .scattering = 0.9}});
+  rows.at_least("transport: parallel_reduce / carpool, wall time, 2 threads",
+                ratio([&] { transport::by_history_parallel(slab, histories, 2); },
+                      [&] { transport::by_event(slab, histories, 2, false); }),
+                "x", 1);
+  const sssp::Grid grid(quick ? 200 : 2000);
+  rows.at_least("sssp: parallel_for per bucket / carpool, wall time, 2 threads",
+                ratio([&] { sssp::delta_stepping_waves(grid, 2, 50); },
+                      [&] { sssp::delta_stepping(grid, 2, 50); }),
+                "x", 1);
+  rows.add("sssp: Dijkstra / carpool, wall time, 2 threads",
+           ratio([&] { sssp::dijkstra(grid); }, [&] { sssp::delta_stepping(grid, 2, 50); }), "x");
 }
 
 int usage() {
-  std::fprintf(stderr, "usage: bench-scheduler [--json FILE] [--quick]\n");
+  std::fprintf(stderr, "usage: bench-scheduler [--json FILE] [--plot FILE.svg] [--quick]\n");
   return 2;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const char* json = nullptr;
+  std::string json;
+  std::string plot;
   bool quick = false;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--json") == 0 && i + 1 < argc) {
       json = argv[++i];
+    } else if (std::strcmp(argv[i], "--plot") == 0 && i + 1 < argc) {
+      plot = argv[++i];
     } else if (std::strcmp(argv[i], "--quick") == 0) {
       quick = true;
     } else {
@@ -237,25 +298,35 @@ int main(int argc, char** argv) {
   }
   const Keys few{.stages = 1, .keys = 64};
   const Keys many{.stages = 16, .keys = 64};
+  fan_out(quick);
   compare(20, 1, few, false);
   compare(20, 1, many, !quick);
   few_items_many_keys();
   if (!quick) {
+    compare(20, 2, few, false);
     compare(20, 2, many, true);
     compare(100, 1, few, false);
-    compare(100, 1, many, false);
+    compare(100, 2, few, false);
+    compare(100, 1, many, true);
     compare(100, 2, many, true);
     compare(500, 1, few, false);
     compare(500, 2, few, false);
     tables();
-    long_tail();
+    long_tail(20);
+    long_tail(100);
     scaling();
-    fan_out();
   }
-  print_table();
-  if (json != nullptr && !write_json(json)) {
-    std::fprintf(stderr, "bench-scheduler: cannot write %s\n", json);
-    return 4;
+  bench::predict(rows, quick);
+  allocations();
+  fan_out_formula();
+  waiting();
+  twins(quick);
+  for (const auto& [path, written] : {std::pair{json, json.empty() || rows.write_json(json)},
+                                      std::pair{plot, plot.empty() || rows.write_plot(plot)}}) {
+    if (!written) {
+      std::fprintf(stderr, "bench-scheduler: cannot write %s\n", path.c_str());
+      return 4;
+    }
   }
   return 0;
 }

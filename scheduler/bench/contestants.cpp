@@ -62,6 +62,11 @@ Result inlined_loop(const Work& work, const Setup& setup) {
 }
 
 Result carpool_run(const Work& work, const Setup& setup) {
+  carpool::RunReport report;
+  return carpool_run(work, setup, report);
+}
+
+Result carpool_run(const Work& work, const Setup& setup, carpool::RunReport& report) {
   std::vector<Result> parts(static_cast<std::size_t>(setup.threads));
   carpool::Graph graph;
   std::vector<carpool::StageHandle<Item>> stages;
@@ -94,7 +99,15 @@ Result carpool_run(const Work& work, const Setup& setup) {
         }
         return last < work.items ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
       });
-  carpool::run(graph, {.arena = &arena_of(setup), .in_flight = setup.in_flight});
+  carpool::RunOptions options{.in_flight = setup.in_flight};
+  if (setup.simulation != nullptr) {
+    options.threads = static_cast<std::uint32_t>(setup.threads);
+    options.mode = carpool::RunMode::simulated;
+    options.simulation = *setup.simulation;
+  } else {
+    options.arena = &arena_of(setup);
+  }
+  report = carpool::run(graph, options);
   Result sum;
   for (const Result& part : parts) {
     sum.sum += part.sum;
@@ -224,6 +237,65 @@ Result task_group(const Work& work, const Setup& setup) {
     }
   });
   return add_up(parts);
+}
+
+namespace {
+constexpr std::uint32_t kLeaves = 64;
+}
+
+std::uint64_t carpool_fan_out(std::uint32_t roots, int threads, carpool::RunReport& report) {
+  carpool::Graph graph;
+  const auto split = graph.add_stage<std::uint32_t>({.name = "split", .rank = 0});
+  const auto leaf = graph.add_stage<std::uint32_t>({.name = "leaf", .rank = 1, .weight = 1});
+  graph.set_kernel(split, [&](const carpool::Batch<std::uint32_t>& batch, carpool::Emitter& out) {
+    for (const std::uint32_t item : batch.items) {
+      for (std::uint32_t i = 0; i < kLeaves; ++i) {
+        out.emit(leaf, 0, item + i);
+      }
+    }
+  });
+  std::vector<Result> sums(static_cast<std::size_t>(threads));
+  graph.set_kernel(leaf, [&](const carpool::Batch<std::uint32_t>& batch, carpool::Emitter&) {
+    for (const std::uint32_t item : batch.items) {
+      sums[batch.worker].sum += item;
+    }
+  });
+  std::uint32_t next = 0;
+  graph.add_source({.name = "roots", .fan_out = kLeaves}, [&](carpool::SourceContext& ctx,
+                                                              carpool::Emitter& out) {
+    for (std::uint32_t i = 0; i < ctx.budget && next < roots; ++i, ++next) {
+      out.emit(split, 0, next);
+    }
+    return next < roots ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
+  });
+  report =
+      carpool::run(graph, {.threads = static_cast<std::uint32_t>(threads), .in_flight = 16384});
+  std::uint64_t sum = 0;
+  for (const Result& part : sums) {
+    sum += part.sum;
+  }
+  return sum;
+}
+
+std::uint64_t flow_graph_fan_out(std::uint32_t roots, int threads) {
+  tbb::task_arena arena(threads);
+  tbb::combinable<Result> parts;
+  arena.execute([&] {
+    tbb::flow::graph graph;
+    tbb::flow::function_node<std::uint32_t, tbb::flow::continue_msg> leaf(
+        graph, tbb::flow::unlimited, [&](std::uint32_t item) { parts.local().sum += item; });
+    tbb::flow::function_node<std::uint32_t, tbb::flow::continue_msg> split(
+        graph, tbb::flow::unlimited, [&](std::uint32_t item) {
+          for (std::uint32_t i = 0; i < kLeaves; ++i) {
+            leaf.try_put(item + i);
+          }
+        });
+    for (std::uint32_t root = 0; root < roots; ++root) {
+      split.try_put(root);
+    }
+    graph.wait_for_all();
+  });
+  return add_up(parts).sum;
 }
 
 }  // namespace bench

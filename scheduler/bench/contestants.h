@@ -1,6 +1,7 @@
 // The contestants: this scheduler, the inlined loop, and what oneTBB offers.
 #pragma once
 
+#include "carpool/run.h"
 #include "workload.h"
 
 namespace bench {
@@ -8,14 +9,20 @@ namespace bench {
 struct Setup {
   int threads = 1;
   std::uint64_t in_flight = 65536;
+  const carpool::Simulation* simulation = nullptr;  // play the run instead, carpool only
 };
 
 // Each does the whole work and returns the sum over all items.
 Result inlined_loop(const Work& work, const Setup& setup);
 Result carpool_run(const Work& work, const Setup& setup);
+Result carpool_run(const Work& work, const Setup& setup, carpool::RunReport& report);
 Result waves(const Work& work, const Setup& setup);
 Result flow_graph(const Work& work, const Setup& setup);
 Result feeder(const Work& work, const Setup& setup);
 Result task_group(const Work& work, const Setup& setup);
+
+// Roots that become 64 leaves each; returns the sum over all leaves.
+std::uint64_t carpool_fan_out(std::uint32_t roots, int threads, carpool::RunReport& report);
+std::uint64_t flow_graph_fan_out(std::uint32_t roots, int threads);
 
 }  // namespace bench

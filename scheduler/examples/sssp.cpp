@@ -2,131 +2,16 @@
 // bucket first.
 //
 // Checked against Dijkstra's algorithm on a grid with random weights.
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <functional>
-#include <queue>
-#include <utility>
 #include <vector>
 
-#include "carpool/carpool.h"
+#include "sssp.h"
 
 namespace {
-
-constexpr std::uint32_t kFar = ~0U;
-
-// A square grid whose edges, to the four neighbours, have weights from 1 to 100.
-class Grid {
- public:
-  explicit Grid(std::uint32_t side) : side_(side) {}
-
-  std::uint32_t vertices() const { return side_ * side_; }
-
-  template <class Visit>
-  void for_each_edge(std::uint32_t from, Visit visit) const {
-    const std::uint32_t x = from % side_;
-    const std::uint32_t y = from / side_;
-    if (x > 0) visit(from - 1, weight(from - 1, 0));
-    if (x + 1 < side_) visit(from + 1, weight(from, 0));
-    if (y > 0) visit(from - side_, weight(from - side_, 1));
-    if (y + 1 < side_) visit(from + side_, weight(from, 1));
-  }
-
- private:
-  static std::uint32_t weight(std::uint32_t vertex, std::uint32_t direction) {
-    std::uint64_t x = (std::uint64_t{vertex} * 2 + direction + 1) * 0x9e3779b97f4a7c15ULL;
-    x = (x ^ (x >> 32)) * 0xd6e8feb86659fd93ULL;
-    return static_cast<std::uint32_t>(1 + (x >> 40) % 100);
-  }
-  std::uint32_t side_;
-};
-
-std::vector<std::uint32_t> dijkstra(const Grid& grid) {
-  std::vector<std::uint32_t> distance(grid.vertices(), kFar);
-  using Entry = std::pair<std::uint32_t, std::uint32_t>;  // distance, vertex
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  distance[0] = 0;
-  queue.emplace(0, 0);
-  while (!queue.empty()) {
-    const auto [far, vertex] = queue.top();
-    queue.pop();
-    if (far == distance[vertex]) {
-      grid.for_each_edge(vertex, [&, far = far](std::uint32_t to, std::uint32_t weight) {
-        if (far + weight < distance[to]) {
-          distance[to] = far + weight;
-          queue.emplace(far + weight, to);
-        }
-      });
-    }
-  }
-  return distance;
-}
-
-// lower sets a distance to a smaller value; false if it is no smaller.
-bool lower(std::atomic<std::uint32_t>& distance, std::uint32_t value) {
-  std::uint32_t seen = distance.load(std::memory_order_relaxed);
-  while (value < seen) {
-    if (distance.compare_exchange_weak(seen, value, std::memory_order_relaxed)) {
-      return true;
-    }
-  }
-  return false;
-}
-
-struct Visit {
-  std::uint32_t vertex;
-  std::uint32_t distance;
-};
-
-std::vector<std::uint32_t> delta_stepping(const Grid& grid, std::uint32_t threads,
-                                          std::uint32_t delta) {
-  constexpr std::uint32_t kBuckets = 256;  // a ring: more than the buckets that are in use at once
-  std::vector<std::atomic<std::uint32_t>> distance(grid.vertices());
-  for (auto& value : distance) {
-    value.store(kFar, std::memory_order_relaxed);
-  }
-  std::atomic<std::uint32_t> nearest{
-      0};  // about where the search is: a hint for the order, no more
-
-  carpool::Graph graph;
-  const auto relax = graph.add_stage<Visit>({.name = "relax", .bins = kBuckets});
-  graph.set_kernel(relax, [&](const carpool::Batch<Visit>& batch, carpool::Emitter& out) {
-    nearest.store(batch.items.front().distance / delta, std::memory_order_relaxed);
-    for (const Visit& visit : batch.items) {
-      if (visit.distance != distance[visit.vertex].load(std::memory_order_relaxed)) {
-        continue;  // a shorter way has been found meanwhile
-      }
-      grid.for_each_edge(visit.vertex, [&](std::uint32_t to, std::uint32_t weight) {
-        const std::uint32_t far = visit.distance + weight;
-        if (lower(distance[to], far)) {
-          out.emit(relax, far / delta % kBuckets, Visit{to, far});
-        }
-      });
-    }
-  });
-  const auto start =
-      graph.add_source({.name = "start"}, [&](carpool::SourceContext&, carpool::Emitter& out) {
-        lower(distance[0], 0);
-        out.emit(relax, 0, Visit{0, 0});
-        return carpool::SourceStatus::exhausted;
-      });
-  graph.add_edge(start, relax);
-  graph.add_edge(relax, relax);
-
-  const auto nearest_bucket =
-      carpool::Policy::custom("nearest bucket", kBuckets, [&](const carpool::BlockInfo& block) {
-        return (block.bin - nearest.load(std::memory_order_relaxed) + kBuckets / 2) % kBuckets;
-      });
-  // One start becomes a whole front, whose size nobody knows beforehand: let the memory grow with
-  // it.
-  carpool::run(graph,
-               {.threads = threads, .policy = nearest_bucket, .overflow = carpool::Overflow::grow});
-  return {distance.begin(), distance.end()};
-}
 
 double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -149,15 +34,21 @@ int main(int argc, char** argv) {
     }
     *value = static_cast<std::uint32_t>(std::strtoul(argv[i + 1], nullptr, 10));
   }
-  const Grid grid(side == 0 ? 1 : side);
+  delta = delta == 0 ? 1 : delta;
+  const sssp::Grid grid(side == 0 ? 1 : side);
   auto begin = std::chrono::steady_clock::now();
-  const std::vector<std::uint32_t> expected = dijkstra(grid);
+  const std::vector<std::uint32_t> expected = sssp::dijkstra(grid);
   const double dijkstra_seconds = seconds_since(begin);
   begin = std::chrono::steady_clock::now();
-  const std::vector<std::uint32_t> found = delta_stepping(grid, threads, delta == 0 ? 1 : delta);
+  const std::vector<std::uint32_t> found = sssp::delta_stepping(grid, threads, delta);
   const double carpool_seconds = seconds_since(begin);
-  std::printf("%u vertices: Dijkstra %.3f s, delta-stepping %.3f s, distances %s\n",
-              grid.vertices(), dijkstra_seconds, carpool_seconds,
-              found == expected ? "equal" : "DIFFERENT");
-  return found == expected ? 0 : 1;
+  begin = std::chrono::steady_clock::now();
+  const bool equal =
+      found == expected && sssp::delta_stepping_waves(grid, threads, delta) == expected;
+  const double waves_seconds = seconds_since(begin);
+  std::printf(
+      "%u vertices: Dijkstra %.3f s, delta-stepping %.3f s, in waves %.3f s, distances %s\n",
+      grid.vertices(), dijkstra_seconds, carpool_seconds, waves_seconds,
+      equal ? "equal" : "DIFFERENT");
+  return equal ? 0 : 1;
 }
