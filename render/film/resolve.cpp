@@ -185,13 +185,4 @@ double EstimateNoise(const FilmAccumulator& film) {
   return known == 0 ? -1 : sum / known;
 }
 
-FilmCounts CountSamples(const FilmAccumulator& film) {
-  FilmCounts counts;
-  for (uint32_t pixel = 0; pixel < film.width() * film.height(); ++pixel) {
-    counts.samples += film.Samples(pixel);
-    counts.rejected += film.Rejected(pixel);
-  }
-  return counts;
-}
-
 }  // namespace carpool::render

@@ -28,10 +28,4 @@ RgbPlane ResolveStandardError(const stages::FilmAccumulator& film);
 /// unknown.
 double EstimateNoise(const stages::FilmAccumulator& film);
 
-struct FilmCounts {
-  uint64_t samples = 0;
-  uint64_t rejected = 0;  // samples that were not finite or beyond the film's range
-};
-FilmCounts CountSamples(const stages::FilmAccumulator& film);
-
 }  // namespace carpool::render

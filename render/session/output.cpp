@@ -8,6 +8,7 @@
 #include "render/image/exr_write.h"
 #include "render/image/png_write.h"
 #include "render/image/tonemap.h"
+#include "render/session/ledger.h"
 #include "render/session/version.h"
 
 namespace carpool::render {
@@ -77,7 +78,7 @@ ExrAttributes Attributes(const RenderSummary& s) {
           {"carpool:isa", s.isa},
           {"carpool:executor", s.executor},
           {"carpool:noise", static_cast<float>(s.noise)},
-          {"carpool:rejectedSamples", std::to_string(s.rejected_samples)},
+          {"carpool:sampleLedger", LedgerText(s)},
           {"carpool:seconds", static_cast<float>(s.render_seconds)},
           {"software", "Carpool " + std::string(kVersion)}};
 }

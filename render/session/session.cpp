@@ -173,7 +173,8 @@ void Describe(const Workspace& w, const RenderSettings& settings, RenderSummary&
 
 void Save(const Workspace& w, const RenderSettings& settings, RenderSummary& summary) {
   const Clock::time_point begin = Clock::now();
-  summary.rejected_samples = CountSamples(w.film()).rejected;
+  summary.ledger = w.film().Ledger();
+  summary.clamp = settings.clamp;
   summary.output = settings.output_path;
   WriteImage(settings.output_path, w.film(), w.plan(), summary);
   if (settings.write_png)

@@ -21,7 +21,8 @@ struct RenderSummary {
   int samples = 0;  // that every pixel has at least
   uint64_t seed = 0;
   double noise = -1;  // relative standard error, negative if unknown
-  uint64_t rejected_samples = 0;
+  stages::SampleLedger ledger;
+  double clamp = 0;  // 0: none
   stages::RayCounts rays;
   double load_seconds = 0, bvh_seconds = 0, render_seconds = 0, save_seconds = 0;
   double first_preview_seconds = -1;  // after the end of the BVH build

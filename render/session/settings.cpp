@@ -97,6 +97,7 @@ void CheckSettings(const RenderSettings& s) {
   CheckRange("--noise", s.noise_target, 0, 1);
   CheckRange("--depth", s.max_depth, 0, kMaxDepth);
   CheckRange("--roulette", s.roulette_depth, 0, kMaxDepth);
+  CheckRange("--clamp", s.clamp, 0, 1e9);
   CheckRange("--exposure", s.exposure, -64, 64);
   CheckRange("--threads", s.threads, 0, kMaxThreads);
   CheckRange("--memory", s.memory_mb, 0, 1 << 20);

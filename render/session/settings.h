@@ -92,6 +92,9 @@ struct RenderSettings {
   /// Vertices before Russian roulette may end dark paths, 0..kMaxDepth; it does so without bias.
   int roulette_depth = kRouletteDepth;
   DirectLight direct = DirectLight::mis;
+  /// The brightest channel a sample may have, in the image's unit; brighter ones are scaled down,
+  /// which is a bias that the summary states. 0: no clamp.
+  double clamp = 0;
   std::uint32_t seed = 0;  ///< another seed, another noise
 
   // The machine. None of these changes the image, except `isa` and `robust` in its last bits.

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "render/session/ledger.h"
 #include "render/session/session.h"
 #include "render/session/version.h"
 
@@ -46,10 +47,7 @@ std::string RenderSummary::Text() const {
                 Mebibytes(bvh_bytes), Mebibytes(film_bytes), Mebibytes(state_bytes + queue_bytes));
   if (!schedule.stages.empty())
     out << Format("  scheduler: %.2f %% of worker time\n", 100 * SchedulerShare(schedule));
-  if (rejected_samples > 0) {
-    out << "  " << rejected_samples
-        << " samples were not finite or too large for the film and were rejected\n";
-  }
+  if (ledger.Count() > 0) out << "  samples: " << LedgerText(*this) << "\n";
   return out.str();
 }
 
@@ -68,7 +66,7 @@ std::string RenderSummary::Json() const {
       {"samples", samples},
       {"seed", seed},
       {"noise", noise},
-      {"rejected_samples", rejected_samples},
+      {"sample_ledger", LedgerJson(*this)},
       {"rays", {{"camera", rays.camera}, {"bounce", rays.bounce}, {"shadow", rays.shadow}}},
       {"seconds",
        {{"load", load_seconds},

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <utility>
 
 namespace carpool::render {
@@ -12,6 +13,11 @@ uint64_t MemoryBytes(const RenderSettings& settings, int threads) {
   if (settings.memory_mb > 0) return uint64_t{static_cast<uint32_t>(settings.memory_mb)} << 20;
   return (uint64_t{64} << 20) +
          (uint64_t{4} << 20) * static_cast<uint64_t>(std::max(0, threads - 2));
+}
+
+float ClampOf(const RenderSettings& settings) {
+  return settings.clamp > 0 ? static_cast<float>(settings.clamp)
+                            : std::numeric_limits<float>::infinity();
 }
 
 stages::DirectSampling DirectSampling(DirectLight direct) {
@@ -111,7 +117,8 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
       plan_(MakePlan(scene_, settings)),
       kernels_(KernelsFor(settings.isa)),
       bvh_(scene_.tables, scene_.placement, {std::string(Name(settings.isa)), settings.robust}),
-      film_(static_cast<uint32_t>(scene_.width), static_cast<uint32_t>(scene_.height), plan_.film),
+      film_(static_cast<uint32_t>(scene_.width), static_cast<uint32_t>(scene_.height), plan_.film,
+            ClampOf(settings)),
       context_(MakeContext(scene_, plan_, settings)) {
   context_.trace = bvh_.View();
   context_.film = &film_;

@@ -4,12 +4,12 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include <array>
 #include <chrono>
 
 #include "stages/executors/busy_clock.h"
 #include "stages/executors/camera_group.h"
 #include "stages/executors/executor.h"
+#include "stages/executors/follow_path.h"
 #include "stages/simd/denormals.h"
 
 namespace carpool::stages {
@@ -31,7 +31,6 @@ class Megakernel final : public Executor {
 
  private:
   void RenderPacket(const CameraPacket& packet, RayCounts& rays) const;
-  void FollowPath(PathState* paths, uint32_t slot, RayCounts& rays) const;
 
   const KernelContext& c_;
   KernelSet kernels_;
@@ -41,33 +40,19 @@ class Megakernel final : public Executor {
   ExecutorOptions options_;
 };
 
-void Megakernel::FollowPath(PathState* paths, uint32_t slot, RayCounts& rays) const {
-  PathState& path = paths[slot];
-  const std::span<const uint32_t> slots(&slot, 1);
-  for (;;) {
-    if (path.placement < 0) {
-      kernels_.miss(c_, paths, slots);
-      break;
-    }
-    Next next = Next::film;
-    kernels_.shade(c_, paths, slots, &next);
-    if (next == Next::shadow) {
-      TraceShadow(c_.trace, opacity_, path);
-      ++rays.shadow;
-      next = (path.flags & kPathAlive) != 0 ? Next::trace : Next::film;
-    }
-    if (next == Next::film) break;
-    IntersectPath(c_.trace, path);
-    ++rays.bounce;
-  }
-  c_.film->Add(path.pixel, path.sample, path.radiance);
-}
-
 void Megakernel::RenderPacket(const CameraPacket& packet, RayCounts& rays) const {
   std::array<PathState, 8> paths;
   const CameraGroup group = TraceCameraGroup(c_, camera_, packet, paths.data(), 0);
   rays.camera += group.count;
-  for (size_t i = 0; i < group.count; ++i) FollowPath(paths.data(), group.slots[i], rays);
+  const auto count = [&rays](PathStep step, const PathState&) {
+    rays.shadow += step == PathStep::shadowed ? 1 : 0;
+    rays.bounce += step == PathStep::traced ? 1 : 0;
+  };
+  for (size_t i = 0; i < group.count; ++i) {
+    PathState& path = paths[group.slots[i]];
+    FollowPath(c_, kernels_, opacity_, path, count);
+    c_.film->Add(path.pixel, path.sample, path.radiance);
+  }
 }
 
 PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& stop,

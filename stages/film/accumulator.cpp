@@ -1,8 +1,11 @@
 // The film's exact sums: fixed point conversion, carries, atomic adds.
 #include "stages/film/accumulator.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "stages/mutants.h"
 
 namespace carpool::stages {
 namespace {
@@ -28,6 +31,16 @@ void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
 // sums. Two threads meet on one pixel almost never, and then for a few nanoseconds.
 constexpr uint32_t kLocked = 1u << 31;
 
+/// What a film of floats would keep.
+void RoundToFloat(FilmPixel& pixel) {
+  for (int i = 0; i < kScrambles * 3; ++i) {
+    const __int128 sum = (static_cast<__int128>(pixel.high[i]) << 64) + pixel.low[i];
+    const auto rounded = static_cast<__int128>(static_cast<float>(sum));
+    pixel.low[i] = static_cast<uint64_t>(rounded);
+    pixel.high[i] = static_cast<int16_t>(rounded >> 64);
+  }
+}
+
 /// Returns the sample count.
 uint32_t Lock(FilmPixel& pixel) {
   std::atomic_ref<uint32_t> state(pixel.samples);
@@ -44,8 +57,13 @@ void Unlock(FilmPixel& pixel, uint32_t samples) {
 
 }  // namespace
 
-FilmAccumulator::FilmAccumulator(uint32_t width, uint32_t height, const FilmPlanes& planes)
-    : width_(width), height_(height), planes_(planes) {
+FilmAccumulator::FilmAccumulator(uint32_t width, uint32_t height, const FilmPlanes& planes,
+                                 float clamp)
+    : width_(width),
+      height_(height),
+      planes_(planes),
+      clamp_(clamp),
+      largest_(std::min(clamp, static_cast<float>(kFilmLargest))) {
   const size_t count = size_t{width} * height;
   pixels_.resize(count);
   if (planes.albedo) albedo_.resize(count * 3);
@@ -60,23 +78,82 @@ uint64_t FilmAccumulator::bytes() const {
          (depth_.size() + object_.size() + material_.size()) * sizeof(uint32_t);
 }
 
+void FilmAccumulator::Enter(SampleFault fault, uint32_t pixel, uint32_t sample) {
+  Fault& entry = faults_[static_cast<size_t>(fault)];
+  FetchAdd(entry.count, uint64_t{1});
+  const uint64_t place = uint64_t{sample} << 32 | pixel;
+  std::atomic_ref<uint64_t> first(entry.first);
+  uint64_t seen = first.load(std::memory_order_relaxed);
+  while (place < seen && !first.compare_exchange_weak(seen, place, std::memory_order_relaxed)) {
+  }
+}
+
+/// Makes a sample one that can be added, and says so in the ledger.
+void FilmAccumulator::Mend(uint32_t pixel, uint32_t sample, double channels[3]) {
+  bool not_finite = false, too_large = false, negative = false;
+  double brightest = 0;
+  for (int c = 0; c < 3; ++c) {
+    double& value = channels[c];
+    if (!std::isfinite(value)) {
+      not_finite = true;
+      value = 0;
+    }
+    if (std::abs(value) > kFilmLargest) {
+      too_large = true;
+      value = std::copysign(kFilmLargest, value);
+    }
+    negative = negative || value < 0;
+    brightest = std::max(brightest, value);
+  }
+  const bool clamped = brightest > clamp_;
+  Enter(not_finite  ? SampleFault::not_finite
+        : too_large ? SampleFault::too_large
+        : negative  ? SampleFault::negative
+                    : SampleFault::clamped,
+        pixel, sample);
+  if (!clamped) return;
+  const std::lock_guard lock(clamp_mutex_);
+  for (int c = 0; c < 3; ++c) {
+    const double kept = channels[c] * (clamp_ / brightest);
+    removed_[c] += ToFixed(channels[c]) - ToFixed(kept);
+    channels[c] = kept;
+  }
+}
+
 void FilmAccumulator::Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
   const int first = static_cast<int>(sample % kScrambles) * 3;
-  bool rejected = false;
+  double channels[3] = {radiance[0], radiance[1], radiance[2]};
+  bool plain = true;
+  for (const double value : channels) plain = plain && value >= 0 && value <= largest_;  // not NaN
+  if (!plain) Mend(pixel, sample, channels);
   int64_t fixed[3];
-  for (int c = 0; c < 3; ++c) {
-    double value = radiance[c];
-    if (!(std::abs(value) <= kFilmLargest)) {  // also NaN
-      rejected = true;
-      value = std::isfinite(value) ? std::copysign(kFilmLargest, value) : 0;
-    }
-    fixed[c] = ToFixed(value);
-  }
+  for (int c = 0; c < 3; ++c) fixed[c] = ToFixed(channels[c]);
   FilmPixel& p = pixels_[pixel];
   const uint32_t samples = Lock(p);
   for (int c = 0; c < 3; ++c) AddFixed(p.low[first + c], p.high[first + c], fixed[c]);
-  p.rejected += rejected ? 1 : 0;
+  if (IsMutant(Mutant::float_film)) RoundToFloat(p);
   Unlock(p, samples + 1);
+}
+
+SampleLedger FilmAccumulator::Ledger() const {
+  SampleLedger ledger;
+  for (int i = 0; i < kSampleFaults; ++i) {
+    const Fault& fault = faults_[static_cast<size_t>(i)];
+    if (fault.count == 0) continue;
+    ledger.entries[static_cast<size_t>(i)] = {fault.count, static_cast<uint32_t>(fault.first),
+                                              static_cast<uint32_t>(fault.first >> 32)};
+  }
+  constexpr double kLuminance[3] = {0.2126, 0.7152, 0.0722};
+  for (int c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (uint32_t pixel = 0; pixel < pixels_.size(); ++pixel) {
+      for (int g = 0; g < kScrambles; ++g) sum += Sum(pixel, g, c);
+    }
+    const double removed = static_cast<double>(removed_[c]) * kFilmQuantum;
+    ledger.removed_energy += kLuminance[c] * removed;
+    ledger.energy += kLuminance[c] * (sum + removed);
+  }
+  return ledger;
 }
 
 void FilmAccumulator::AddFirstHit(uint32_t pixel, uint32_t sample, const FirstHit& hit) {

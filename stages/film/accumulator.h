@@ -1,8 +1,11 @@
 // The film while rendering: exact integer sums per pixel, so that samples may arrive in any order.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
+#include <limits>
+#include <mutex>
 #include <vector>
 
 namespace carpool::stages {
@@ -16,10 +19,37 @@ constexpr double kFilmLargest = 0x1p30;   // larger channels are clamped and cou
 struct alignas(64) FilmPixel {
   uint64_t low[kScrambles * 3];
   int16_t high[kScrambles * 3];
-  uint32_t samples;   // below 2^31: the top bit is a lock while a sample is being added
-  uint32_t rejected;  // samples that were not finite (counted as 0) or were clamped to the range
+  uint32_t samples;  // below 2^31: the top bit is a lock while a sample is being added
 };
 static_assert(sizeof(FilmPixel) == 128);
+
+/// Why a sample went into the ledger. Each sample is entered once, under the first that holds.
+enum class SampleFault : uint8_t {
+  not_finite,  // a channel was NaN or infinite, and counts as 0
+  too_large,   // a channel was beyond kFilmLargest, and counts as that
+  negative,    // a channel was below 0; it is added as it is
+  clamped,     // the brightest channel was above the user's clamp: all were scaled down to it
+};
+constexpr int kSampleFaults = 4;
+
+/// Samples that were not taken as they came, by cause; the first of each is the one with the least
+/// (sample, pixel), whatever the order in which they came.
+struct SampleLedger {
+  struct Entry {
+    uint64_t count = 0;
+    uint32_t pixel = 0, sample = 0;  // of the first
+  };
+  std::array<Entry, kSampleFaults> entries;
+  double energy = 0;          // luminance of all samples that were finite, summed, before the clamp
+  double removed_energy = 0;  // what the clamp took of it
+
+  const Entry& Of(SampleFault fault) const { return entries[static_cast<size_t>(fault)]; }
+  uint64_t Count() const {
+    uint64_t count = 0;
+    for (const Entry& entry : entries) count += entry.count;
+    return count;
+  }
+};
 
 /// Which optional planes the plan asked for.
 struct FilmPlanes {
@@ -43,15 +73,17 @@ struct FirstHit {
 /// exact only while no thread adds.
 class FilmAccumulator {
  public:
-  FilmAccumulator(uint32_t width, uint32_t height, const FilmPlanes& planes);
+  /// `clamp`: the brightest channel that a sample may have; infinity: no clamp.
+  FilmAccumulator(uint32_t width, uint32_t height, const FilmPlanes& planes,
+                  float clamp = std::numeric_limits<float>::infinity());
 
   uint32_t width() const { return width_; }
   uint32_t height() const { return height_; }
   const FilmPlanes& planes() const { return planes_; }
   uint64_t bytes() const;
 
-  /// Adds one sample of `pixel` (y * width + x). Non-finite channels count as 0, oversized ones as
-  /// the largest; either is counted in `rejected`.
+  /// Adds one sample of `pixel` (y * width + x). What cannot be added as it is, is entered in the
+  /// ledger.
   void Add(uint32_t pixel, uint32_t sample, const float radiance[3]);
   /// Asks for the pixel's cache lines ahead of Add.
   void Prefetch(uint32_t pixel) const {
@@ -63,7 +95,8 @@ class FilmAccumulator {
   void AddFirstHit(uint32_t pixel, uint32_t sample, const FirstHit& hit);
 
   uint32_t Samples(uint32_t pixel) const { return pixels_[pixel].samples; }
-  uint32_t Rejected(uint32_t pixel) const { return pixels_[pixel].rejected; }
+  /// What was entered so far; sums over the film, so not cheap.
+  SampleLedger Ledger() const;
   /// Sum of one channel over the samples of one scramble.
   double Sum(uint32_t pixel, int scramble, int channel) const;
   void Albedo(uint32_t pixel, double rgb[3]) const;  // mean over the samples
@@ -75,8 +108,20 @@ class FilmAccumulator {
   uint32_t Material(uint32_t pixel) const { return material_[pixel]; }
 
  private:
+  struct Fault {
+    uint64_t count = 0;
+    uint64_t first = ~uint64_t{0};  // sample, then pixel
+  };
+
+  void Enter(SampleFault fault, uint32_t pixel, uint32_t sample);
+  void Mend(uint32_t pixel, uint32_t sample, double channels[3]);
+
   uint32_t width_, height_;
   FilmPlanes planes_;
+  float clamp_, largest_;  // largest_: channels up to here are added as they are
+  std::array<Fault, kSampleFaults> faults_;
+  std::mutex clamp_mutex_;
+  __int128 removed_[3] = {0, 0, 0};  // by the clamp, in quanta
   std::vector<FilmPixel> pixels_;
   std::vector<int64_t> albedo_, normal_;  // 3 per pixel, quantum 2^-32
   std::vector<float> depth_;

@@ -14,6 +14,7 @@
 #include "stages/kernels/bsdf_diffuse-inl.h"
 #include "stages/kernels/bsdf_multiscatter-inl.h"
 #include "stages/kernels/bsdf_specular-inl.h"
+#include "stages/mutants.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
@@ -153,7 +154,8 @@ template <class D>
 HWY_INLINE BsdfSample<D> SampleBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo, Real<D> u_lobe,
                                     const Vec2<D>& u) {
   const Vec3<D> wi = bsdf.Sample(d, wo, u_lobe, u);
-  const BsdfValue<D> value = EvaluateBsdf<D>(d, bsdf, wo, wi);
+  BsdfValue<D> value = EvaluateBsdf<D>(d, bsdf, wo, wi);
+  if (IsMutant(Mutant::large_pdf)) value.pdf = value.pdf * Splat(d, 1.005);
   const Mask<D> valid = hn::Gt(value.pdf, hn::Zero(d));
   const Real<D> inverse = SafeDiv(d, Splat(d, 1), value.pdf);
   return {wi, Scale<D>(value.f_cos, inverse), value.pdf, valid};

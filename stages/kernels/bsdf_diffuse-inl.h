@@ -15,6 +15,7 @@
 #include <numbers>
 
 #include "stages/kernels/bsdf_lobes-inl.h"
+#include "stages/mutants.h"
 #include "stages/sampling/warp-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -33,7 +34,8 @@ struct DiffuseLobe {
   HWY_INLINE void Evaluate(D d, const DirectionPair<D>& pair, LobeSum<D>& sum) const {
     if (hn::AllFalse(d, hn::Gt(weight, hn::Zero(d)))) return;
     const Real<D> pdf = pair.cosine * Splat(d, 1 / std::numbers::pi);
-    sum.f_cos = MulAdd<D>(diffuse, pdf * sum.below * Passed(d, pair.albedo), sum.f_cos);
+    const Real<D> f_cos = IsMutant(Mutant::missing_cosine) ? Splat(d, 1 / std::numbers::pi) : pdf;
+    sum.f_cos = MulAdd<D>(diffuse, f_cos * sum.below * Passed(d, pair.albedo), sum.f_cos);
     sum.weighted_pdf = hn::MulAdd(weight, pdf, sum.weighted_pdf);
   }
 

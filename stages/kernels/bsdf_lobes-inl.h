@@ -101,6 +101,22 @@ struct LobeSet : Lobes<D>... {
     return wi;
   }
 
+  /// The number, from the top, of the lobe that Sample takes for u_lobe in the first lane; -1:
+  /// none.
+  HWY_INLINE int32_t ChosenLobe(D, Real<D> u_lobe) const {
+    const auto target = hn::GetLane(u_lobe * total_weight);
+    auto running = hn::GetLane(hn::Zero(D()));
+    int32_t chosen = -1, number = 0;
+    const auto visit = [&](Real<D> weight) HWY_ATTR {
+      const auto next = running + hn::GetLane(weight);
+      if (target >= running && target < next) chosen = number;
+      running = next;
+      ++number;
+    };
+    (visit(Lobes<D>::weight), ...);
+    return chosen;
+  }
+
  private:
   template <class Lobe>
   HWY_INLINE void SampleIfChosen(D d, Real<D> target, Real<D>& running, const Vec3<D>& wo,

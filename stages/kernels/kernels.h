@@ -22,6 +22,17 @@ namespace carpool::stages {
 /// lights are always sampled as lights).
 enum class DirectSampling : uint8_t { mis, light, bsdf };
 
+/// What one vertex of one path did that its state does not keep. One-lane kernels write it where a
+/// path is explained.
+struct PathProbe {
+  int32_t lobe = -1;             // that was sampled, in the order of Bsdf's lobes
+  float light_pdf = 0;           // of the direction that light sampling chose, ...
+  float light_bsdf_pdf = 0;      // ... and what BSDF sampling has for it
+  float light_weight = 0;        // of that light sample
+  float emission_light_pdf = 0;  // what light sampling has for the emission that was hit, ...
+  float emission_weight = 0;     // ... and its weight; 0: nothing that emits was hit
+};
+
 /// All that kernels read of a render; borrowed, constant while it runs.
 struct KernelContext {
   Camera camera;
@@ -38,6 +49,7 @@ struct KernelContext {
   uint32_t max_depth = 8;       // scattering events
   uint32_t roulette_depth = 3;  // events before Russian roulette
   DirectSampling direct = DirectSampling::mis;
+  PathProbe* probe = nullptr;  // set where one path alone is followed, to explain it
 };
 
 /// Where a path goes next.

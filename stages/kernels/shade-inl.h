@@ -10,6 +10,8 @@
 #define CARPOOL_STAGES_KERNELS_SHADE_INL_H_
 #endif
 
+#include <utility>
+
 #include "stages/kernels/bsdf-inl.h"
 #include "stages/kernels/kernels.h"
 #include "stages/kernels/light_sample-inl.h"
@@ -33,6 +35,7 @@ HWY_INLINE Real<D> PowerHeuristic(D d, Real<D> own, Real<D> other) {
 template <class D>
 HWY_INLINE Real<D> StrategyWeight(D d, const KernelContext& c, DirectSampling own, Real<D> own_pdf,
                                   Real<D> other_pdf) {
+  if (IsMutant(Mutant::swapped_mis)) std::swap(own_pdf, other_pdf);
   if (c.direct == DirectSampling::mis) return PowerHeuristic(d, own_pdf, other_pdf);
   return Splat(d, c.direct == own ? 1 : 0);
 }
@@ -188,9 +191,11 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> a
     const Real<D> pdf =
         lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
                                        t.p1, t.p2, Neg<D>(v.toward), v.distance);
+    if (c.probe != nullptr) c.probe->emission_light_pdf = static_cast<float>(hn::GetLane(pdf));
     weight =
         hn::IfThenElse(sampled, StrategyWeight(d, c, DirectSampling::bsdf, v.ray_pdf, pdf), weight);
   }
+  if (c.probe != nullptr) c.probe->emission_weight = static_cast<float>(hn::GetLane(weight));
   const Vec3<D> added = Scale(Mul<D>(v.throughput, emitted), weight);
   v.radiance = Select<D>(active, Add<D>(v.radiance, added), v.radiance);
 }
@@ -276,11 +281,17 @@ HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& 
   const BsdfValue<D> f = EvaluateBsdf(d, s.bsdf, s.wo, ToLocal(s.frame, light.wi));
   const Real<D> mis = hn::IfThenElse(light.delta, Splat(d, 1),
                                      StrategyWeight(d, c, DirectSampling::light, light.pdf, f.pdf));
+  if (c.probe != nullptr) {
+    c.probe->light_pdf = static_cast<float>(hn::GetLane(light.pdf));
+    c.probe->light_bsdf_pdf = static_cast<float>(hn::GetLane(f.pdf));
+    c.probe->light_weight = static_cast<float>(hn::GetLane(mis));
+  }
   const Real<D> scale = SafeDiv(d, mis, light.pdf);
   const Vec3<D> incoming = SampledRadiance(d, c, light, wanted);
   shadow.radiance = Scale(Mul<D>(Mul<D>(v.throughput, f.f_cos), incoming), scale);
   shadow.wanted = hn::And(wanted, hn::Gt(MaxComponent(shadow.radiance), zero));
-  // Stops short of the light by what both ends may be off, so that the light never shadows itself.
+  // Stops short of the light by what both ends may be off, so that the light never shadows itself:
+  // a wall as close to the light as 2^-19 (distance + largest coordinates of both ends) is missed.
   const Vec3<D> end = MulAdd(light.wi, light.distance, s.origin);
   const auto most = [](const Vec3<D>& a) HWY_ATTR {
     return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
@@ -306,6 +317,7 @@ HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& 
   const Real<D> u_lobe = Sample1D(d, v.key, v.number, Purpose::lobe);
   const Vec2<D> u = Sample2D(d, v.key, v.number, Purpose::bsdf);
   const BsdfSample<D> sample = SampleBsdf(d, s.bsdf, s.wo, u_lobe, u);
+  if (c.probe != nullptr) c.probe->lobe = s.bsdf.ChosenLobe(d, u_lobe);
   Bounce<D> b;
   b.direction = ToWorld(s.frame, sample.wi);
   b.throughput = Mul<D>(v.throughput, sample.weight);
@@ -419,6 +431,10 @@ HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
   const Real<D> light_pdf = environment.pdf * Splat(d, c.lights.environment_probability);
   const Real<D> weight = hn::IfThenElse(
       bounced, StrategyWeight(d, c, DirectSampling::bsdf, pdf, light_pdf), Splat(d, 1));
+  if (c.probe != nullptr) {
+    c.probe->emission_light_pdf = static_cast<float>(hn::GetLane(light_pdf));
+    c.probe->emission_weight = static_cast<float>(hn::GetLane(weight));
+  }
   const Vec3<D> throughput = PathVec3(d, p, offsetof(PathState, throughput));
   const Vec3<D> sum = Add<D>(PathVec3(d, p, offsetof(PathState, radiance)),
                              Scale(Mul<D>(throughput, environment.radiance), weight));

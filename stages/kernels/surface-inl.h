@@ -13,6 +13,7 @@
 #include "stages/kernels/kernels.h"
 #include "stages/kernels/texture-inl.h"
 #include "stages/kernels/triangle-inl.h"
+#include "stages/mutants.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
@@ -347,8 +348,9 @@ HWY_INLINE Vec3<D> FaceViewer(D d, const Vec3<D>& normal, const Vec3<D>& toward)
 template <class D>
 HWY_INLINE Vec3<D> OffsetOrigin(D d, const Surface<D>& s) {
   const Vec3<D>& n = s.geometric;
-  const Real<D> distance = hn::MulAdd(
-      hn::Abs(n.x), s.error.x, hn::MulAdd(hn::Abs(n.y), s.error.y, hn::Abs(n.z) * s.error.z));
+  Real<D> distance = hn::MulAdd(hn::Abs(n.x), s.error.x,
+                                hn::MulAdd(hn::Abs(n.y), s.error.y, hn::Abs(n.z) * s.error.z));
+  if (IsMutant(Mutant::epsilon_offset)) distance = Splat(d, 1e-4);
   const auto moved = [&](Real<D> p, Real<D> axis) HWY_ATTR {
     const Real<D> offset = axis * distance;
     const Real<D> o = p + offset;

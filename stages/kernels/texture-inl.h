@@ -21,6 +21,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "stages/mutants.h"
 #include "stages/simd/lanes-inl.h"
 #include "stages/tables/texture_view.h"
 
@@ -187,7 +188,7 @@ HWY_INLINE Axis<D> ResolveAxis(D d, Real<D> u, Field wrap, Real<D> size,
                                const Nearest<D>& nearest) {
   const Real<D> zero = hn::Zero(d), last = size - Splat(d, 1);
   const Real<D> x = WrapUnit(d, u, wrap) * size;
-  Real<D> position = x - Splat(d, 0.5);
+  Real<D> position = x - Splat(d, IsMutant(Mutant::shifted_texel) ? 0 : 0.5);
   if (nearest.any) {
     position = hn::IfThenElse(nearest.mask, hn::Min(hn::Floor(x), last), position);
   }

@@ -21,18 +21,18 @@ using EmbreeContext = RTCIntersectContext;
 constexpr RTCSceneFlags kFilterPerRay = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
 #endif
 
-/// What travels with a ray that gathers: Embree hands its context back to the filter.
-template <class Visit>
-struct GatherContext {
+/// What travels with a single ray whose hits are looked at: Embree hands its context back to the
+/// filter. `accept(RTCHit, t)` says whether a hit counts.
+template <class Accept>
+struct FilterContext {
   EmbreeContext embree;
-  Visit visit;
+  Accept accept;
 
-  /// Tells of a hit and turns it down, so that traversal goes on.
   static void Filter(const RTCFilterFunctionNArguments* arguments) {
-    const auto* const self = reinterpret_cast<const GatherContext*>(arguments->context);
-    self->visit(rtcGetHitFromHitN(arguments->hit, arguments->N, 0),
-                RTCRayN_tfar(arguments->ray, arguments->N, 0));
-    arguments->valid[0] = 0;
+    const auto* const self = reinterpret_cast<const FilterContext*>(arguments->context);
+    const bool accepted = self->accept(rtcGetHitFromHitN(arguments->hit, arguments->N, 0),
+                                       RTCRayN_tfar(arguments->ray, arguments->N, 0));
+    if (!accepted) arguments->valid[0] = 0;
   }
 };
 
@@ -58,18 +58,18 @@ inline void EmbreeOccluded1(RTCScene scene, RTCRay* ray) {
   rtcInitOccludedArguments(&arguments);
   rtcOccluded1(scene, ray, &arguments);
 }
-/// Calls visit(RTCHit, t) for every hit with tnear < t <= tfar, in no order, some maybe twice. The
-/// scene needs kFilterPerRay.
-template <class Visit>
-void EmbreeGather1(RTCScene scene, RTCRay* ray, Visit visit) {
-  GatherContext<Visit> context{{}, std::move(visit)};
+/// Is there a hit that accept(RTCHit, t) takes? Then ray->tfar is negative. Hits come in no order,
+/// some maybe twice; the scene needs kFilterPerRay.
+template <class Accept>
+void EmbreeOccluded1(RTCScene scene, RTCRay* ray, Accept accept) {
+  FilterContext<Accept> context{{}, std::move(accept)};
   rtcInitRayQueryContext(&context.embree);
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);
   arguments.flags = static_cast<RTCRayQueryFlags>(RTC_RAY_QUERY_FLAG_INCOHERENT |
                                                   RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
   arguments.context = &context.embree;
-  arguments.filter = &GatherContext<Visit>::Filter;
+  arguments.filter = &FilterContext<Accept>::Filter;
   rtcOccluded1(scene, ray, &arguments);
 }
 
@@ -94,10 +94,10 @@ inline void EmbreeOccluded1(RTCScene scene, RTCRay* ray) {
   RTCIntersectContext context = IntersectContext(Coherence::incoherent);
   rtcOccluded1(scene, &context, ray);
 }
-template <class Visit>
-void EmbreeGather1(RTCScene scene, RTCRay* ray, Visit visit) {
-  GatherContext<Visit> context{IntersectContext(Coherence::incoherent), std::move(visit)};
-  context.embree.filter = &GatherContext<Visit>::Filter;
+template <class Accept>
+void EmbreeOccluded1(RTCScene scene, RTCRay* ray, Accept accept) {
+  FilterContext<Accept> context{IntersectContext(Coherence::incoherent), std::move(accept)};
+  context.embree.filter = &FilterContext<Accept>::Filter;
   rtcOccluded1(scene, &context.embree, ray);
 }
 

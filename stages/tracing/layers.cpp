@@ -4,14 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <tuple>
 #include <vector>
 
 namespace carpool::stages {
 namespace {
 
-bool SameTriangle(const LayerHit& hit, int32_t placement, uint32_t primitive) {
-  return hit.placement == placement && hit.primitive == primitive;
+constexpr TriangleName kNoTriangle = {kNone, 0};
+
+TriangleName NameOf(const LayerHit& hit) {
+  return {hit.placement, hit.primitive};
 }
 
 bool Before(const LayerHit& a, const LayerHit& b) {
@@ -46,12 +49,25 @@ bool IsRepeated(const GeometryView& g, std::span<const LayerHit> hits, size_t i,
   return false;
 }
 
-void Gather(const TraceLevel& level, bool opaque, RTCRay ray, std::vector<LayerHit>& hits) {
+/// All hits but those on the triangle `left`, which the ray starts from.
+void Gather(const TraceLevel& level, bool opaque, RTCRay ray, const TriangleName& left,
+            std::vector<LayerHit>& hits) {
   if (level.scene == nullptr) return;
-  EmbreeGather1(level.scene, &ray, [&level, opaque, &hits](const RTCHit& hit, float distance) {
-    hits.push_back({distance, PlacementOf(level, hit.instID[0], hit.geomID), hit.primID, hit.u,
-                    hit.v, opaque});
+  // Accepting none, the query meets all.
+  EmbreeOccluded1(level.scene, &ray, [&](const RTCHit& hit, float distance) {
+    const int32_t placement = PlacementOf(level, hit.instID[0], hit.geomID);
+    if (left != TriangleName{placement, hit.primID})
+      hits.push_back({distance, placement, hit.primID, hit.u, hit.v, opaque});
+    return false;
   });
+}
+
+void MoveTo(const LayerHit& hit, PathState& path) {
+  path.placement = hit.placement;
+  path.primitive = hit.primitive;
+  path.u = hit.u;
+  path.v = hit.v;
+  path.distance = hit.distance;
 }
 
 /// Scratch of this thread.
@@ -101,36 +117,41 @@ bool NextLayerHere(const TraceView& view, PathState& path) {
          first.distance + reach);
   std::vector<LayerHit>& hits = Scratch();
   hits.push_back({first.distance, first.placement, first.primitive, 0, 0, false});
-  Gather(view.transparent, false, ray, hits);
-  Gather(view.opaque, true, ray, hits);
-  const auto is_first = [&](const LayerHit& hit) {
-    return SameTriangle(hit, first.placement, first.primitive);
-  };
+  Gather(view.transparent, false, ray, kNoTriangle, hits);
+  Gather(view.opaque, true, ray, kNoTriangle, hits);
+  const TriangleName first_name = {first.placement, first.primitive};
+  const auto is_first = [&](const LayerHit& hit) { return NameOf(hit) == first_name; };
   hits.erase(std::remove_if(hits.begin() + 1, hits.end(), is_first), hits.end());
   std::sort(hits.begin() + 1, hits.end(), Before);
 
-  const auto last = std::find_if(hits.begin(), hits.end(), [&](const LayerHit& hit) {
-    return SameTriangle(hit, path.placement, path.primitive);
-  });
+  const TriangleName last_name = {path.placement, path.primitive};
+  const auto last = std::find_if(hits.begin(), hits.end(),
+                                 [&](const LayerHit& hit) { return NameOf(hit) == last_name; });
   if (last == hits.end()) return false;
   for (size_t i = static_cast<size_t>(last - hits.begin()) + 1; i < hits.size(); ++i) {
     if (IsRepeated(view.geometry, hits, i, 2 * reach)) continue;
-    const LayerHit& hit = hits[i];
-    path.placement = hit.placement;
-    path.primitive = hit.primitive;
-    path.u = hit.u;
-    path.v = hit.v;
-    path.distance = hit.distance;
+    MoveTo(hits[i], path);
     return true;
   }
   return false;
+}
+
+void NearestBut(const TraceView& view, const TriangleName& left, PathState& path) {
+  RTCRay ray;
+  SetRay(ray, path.origin, path.direction, path.tnear, std::numeric_limits<float>::infinity());
+  std::vector<LayerHit>& hits = Scratch();
+  Gather(view.transparent, false, ray, left, hits);
+  Gather(view.opaque, true, ray, left, hits);
+  path.placement = kNone;
+  const auto nearest = std::min_element(hits.begin(), hits.end(), Before);
+  if (nearest != hits.end()) MoveTo(*nearest, path);
 }
 
 std::span<const LayerHit> ShadowLayers(const TraceView& view, const PathState& path) {
   RTCRay ray;
   SetRay(ray, path.origin, path.shadow_direction, 0, path.shadow_distance);
   std::vector<LayerHit>& hits = Scratch();
-  Gather(view.transparent, false, ray, hits);
+  Gather(view.transparent, false, ray, {path.placement, path.primitive}, hits);
   if (hits.size() > kMaxAlphaLayers) return hits;
   std::sort(hits.begin(), hits.end(), Before);
   thread_local std::vector<LayerHit> once;

@@ -14,6 +14,12 @@
 
 namespace carpool::stages {
 
+struct TriangleName {
+  int32_t placement;
+  uint32_t primitive;
+  bool operator==(const TriangleName&) const = default;
+};
+
 struct LayerHit {
   float distance;
   int32_t placement;
@@ -33,6 +39,10 @@ float LayerReach(const PathState& path);
 
 /// Moves the path to the hit after its last one at the same place; false if there is none.
 bool NextLayerHere(const TraceView& view, PathState& path);
+
+/// Finds the nearest hit of the path's ray that is not on the triangle `left`. Slow: meets all
+/// hits.
+void NearestBut(const TraceView& view, const TriangleName& left, PathState& path);
 
 /// What the path's shadow ray meets of the transparent level, in order; more than kMaxAlphaLayers
 /// hits are not told apart. Valid until the next call on this thread.

@@ -64,15 +64,21 @@ float Transmittance(const TraceView& view, const OpacityQuery& query, const Path
 }  // namespace
 
 void IntersectPath(const TraceView& view, PathState& path) {
-  if ((path.flags & kPathLayerMask) != 0) {
+  const bool fresh = (path.flags & kPathLayerMask) == 0;
+  if (!fresh) {
     if (NextLayerHere(view, path)) return;
     path.tnear = path.first_layer.distance + LayerReach(path);
   }
+  const TriangleName left = {path.placement, path.primitive};
   RTCRayHit ray;
   SetRay(ray.ray, path.origin, path.direction, path.tnear, kInfinity);
-  path.placement = -1;
+  path.placement = kNone;
   Nearest(view.opaque, ray, path);
   Nearest(view.transparent, ray, path);
+  // A ray never meets the triangle that it leaves, whatever rounding says: a needle's plane may be
+  // off by far more than any bound on the origin.
+  if (fresh && path.placement != kNone && left == TriangleName{path.placement, path.primitive})
+    NearestBut(view, left, path);
   MarkFirstLayer(path);
 }
 
@@ -108,7 +114,11 @@ void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& 
   if (view.opaque.scene != nullptr) {
     RTCRay ray;
     SetRay(ray, path.origin, path.shadow_direction, 0, path.shadow_distance);
-    EmbreeOccluded1(view.opaque.scene, &ray);
+    // As in IntersectPath, the triangle that the ray leaves does not count.
+    EmbreeOccluded1(view.opaque.scene, &ray, [&](const RTCHit& hit, float) {
+      return hit.primID != path.primitive ||
+             PlacementOf(view.opaque, hit.instID[0], hit.geomID) != path.placement;
+    });
     if (ray.tfar < 0) through = 0;
   }
   if (through > 0 && view.transparent.scene != nullptr) {

@@ -35,7 +35,8 @@ struct OpacityQuery {
 
 /// Finds the next hit of the path's ray and writes placement, primitive, u, v and distance: the
 /// nearest, or the one after the last if that let the ray through (layers.h says what comes after
-/// what). Deterministic: the same ray gives the same hit in every executor.
+/// what). The triangle that a ray leaves, the last hit of a path whose ray is new, is not hit.
+/// Deterministic: the same ray gives the same hit in every executor.
 void IntersectPath(const TraceView& view, PathState& path);
 
 /// Eight camera rays of a fixed 4x2 pixel group, as one coherent packet. Null entries are skipped.

@@ -18,8 +18,6 @@ constexpr double kSuspicion = 1e-3;
 /// freedom.
 const double kPowerErrors = StudentQuantile(kFalseAlarm, kSeeds - 1) + 2.33;
 
-uint32_t seed_offset = 0;
-
 std::string Format(const char* format, auto... values) {
   char line[512];
   std::snprintf(line, sizeof line, format, values...);
@@ -36,18 +34,11 @@ std::string Describe(const Mean& mean) {
 /// Runs `tail` on few estimates, and on four times as many new ones if those look suspicious.
 /// Returns the p-value that counts.
 double Judge(const std::function<double(uint32_t first, int count)>& tail) {
-  const double p = tail(FirstSeed(), kSeeds);
-  return p >= kSuspicion ? p : tail(FirstSeed() + kSeeds, 4 * kSeeds);
+  const double p = tail(kFirstSeed, kSeeds);
+  return p >= kSuspicion ? p : tail(kFirstSeed + kSeeds, 4 * kSeeds);
 }
 
 }  // namespace
-
-void SetSeedOffset(uint32_t offset) {
-  seed_offset = offset;
-}
-uint32_t FirstSeed() {
-  return 1 + seed_offset;
-}
 
 Subject SubjectOf(const SceneCase& scene) {
   const auto renderer = std::make_shared<CaseRenderer>(scene);

@@ -8,20 +8,22 @@
 
 #include "tests/hard_cases/figures.h"
 #include "tests/hard_cases/scenes.h"
+#include "tests/hard_cases/table.h"
 
 namespace carpool::test {
 namespace {
 
 constexpr const char* kUsage =
-    "usage: hard-cases [--write DIR | --json FILE] [--gtest_filter=PATTERN ...]\n"
+    "usage: hard-cases [--write DIR | --table | --json FILE] [--gtest_filter=PATTERN ...]\n"
     "  --write DIR   writes every scene of the suite as glTF, with its sky, and how to render it\n"
+    "  --table       prints how stable rays are at all scales and offsets, robust or not\n"
     "  --json FILE   runs the suite and writes what it measured\n";
 
 void WriteAll(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   for (const SceneCase& scene : AllScenes()) {
     WriteCase(scene, folder);
-    std::printf("%s\n", RenderCommand(scene, FirstSeed()).c_str());
+    std::printf("%s\n", RenderCommand(scene, kFirstSeed).c_str());
   }
 }
 
@@ -32,6 +34,10 @@ int Run(int argc, char** argv) {
     const std::string_view flag = argv[i];
     if (flag == "--write" && i + 1 < argc) {
       WriteAll(argv[i + 1]);
+      return 0;
+    }
+    if (flag == "--table") {
+      PrintTable();
       return 0;
     }
     if (flag == "--json" && i + 1 < argc) {

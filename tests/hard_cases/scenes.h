@@ -45,6 +45,10 @@ std::vector<Twins> StrategyTwins();
 std::vector<Twins> TransformTwins();
 std::vector<Twins> ScaleTwins();
 
+/// Row 46: a room with an object in it whose light and shade depend on all of its geometry, scaled
+/// and then moved, camera included.
+SceneCase RoomAt(double scale, const Point& offset);
+
 /// A white surface of glTF's model.
 int AddWhite(SceneBuilder& b, double metallic, double roughness);
 

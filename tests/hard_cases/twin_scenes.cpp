@@ -55,37 +55,6 @@ SceneCase Lit(const std::string& light, const Glossy& material, DirectLight dire
   return c;
 }
 
-/// A room with an object in it whose light and shade depend on all of its geometry.
-SceneCase Room(const std::string& name, double scale, const Point& offset) {
-  SceneCase c{.name = name};
-  SceneBuilder& b = c.scene;
-  const auto at = [&](double x, double y, double z) {
-    return nlohmann::json{offset[0] + scale * x, offset[1] + scale * y, offset[2] + scale * z};
-  };
-  const nlohmann::json size = {scale, scale, scale};
-  const int wall = b.AddLambert({0.6, 0.6, 0.6});
-  const int lamp = b.AddLambert({0, 0, 0}, {1, 1, 1}, 5);
-  const int metal = b.AddMaterial({{"pbrMetallicRoughness",
-                                    {{"baseColorFactor", {0.9, 0.7, 0.5, 1}},
-                                     {"metallicFactor", 1},
-                                     {"roughnessFactor", 0.4}}}});
-  b.AddNode({{"mesh", b.AddBox(2, wall, true)}, {"translation", at(0, 0, 0)}, {"scale", size}});
-  b.AddNode({{"mesh", b.AddQuad({-0.7, 1.9, -0.7}, {0.7, 1.9, -0.7}, {0.7, 1.9, 0.7},
-                                {-0.7, 1.9, 0.7}, lamp)},
-             {"translation", at(0, 0, 0)},
-             {"scale", size}});
-  b.AddNode({{"mesh", b.AddSphere(0.7, 16, metal, false)},
-             {"translation", at(0.3, -0.6, 0)},
-             {"scale", size}});
-  b.AddPunctual({{"type", "point"}, {"intensity", 2 * scale * scale}},
-                {{"translation", at(-1, 0.5, 1)}});
-  b.json()["cameras"] = {
-      {{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.01 * scale}}}}};
-  b.AddNode({{"camera", 0}, {"translation", at(0, 0, 1.8)}});
-  c.settings = HardSettings(384, 4);
-  return c;
-}
-
 /// Row 10: an object under a transform, as nodes (`times` of them, so that they are instanced or
 /// not) or with the transform baked into its vertices.
 SceneCase Transformed(const std::string& name, const Point& scale, bool baked, bool instanced) {
@@ -136,6 +105,36 @@ SceneCase Transformed(const std::string& name, const Point& scale, bool baked, b
 
 }  // namespace
 
+SceneCase RoomAt(double scale, const Point& offset) {
+  SceneCase c{.name = "row46_room"};
+  SceneBuilder& b = c.scene;
+  const auto at = [&](double x, double y, double z) {
+    return nlohmann::json{offset[0] + scale * x, offset[1] + scale * y, offset[2] + scale * z};
+  };
+  const nlohmann::json size = {scale, scale, scale};
+  const int wall = b.AddLambert({0.6, 0.6, 0.6});
+  const int lamp = b.AddLambert({0, 0, 0}, {1, 1, 1}, 5);
+  const int metal = b.AddMaterial({{"pbrMetallicRoughness",
+                                    {{"baseColorFactor", {0.9, 0.7, 0.5, 1}},
+                                     {"metallicFactor", 1},
+                                     {"roughnessFactor", 0.4}}}});
+  b.AddNode({{"mesh", b.AddBox(2, wall, true)}, {"translation", at(0, 0, 0)}, {"scale", size}});
+  b.AddNode({{"mesh", b.AddQuad({-0.7, 1.9, -0.7}, {0.7, 1.9, -0.7}, {0.7, 1.9, 0.7},
+                                {-0.7, 1.9, 0.7}, lamp)},
+             {"translation", at(0, 0, 0)},
+             {"scale", size}});
+  b.AddNode({{"mesh", b.AddSphere(0.7, 16, metal, false)},
+             {"translation", at(0.3, -0.6, 0)},
+             {"scale", size}});
+  b.AddPunctual({{"type", "point"}, {"intensity", 2 * scale * scale}},
+                {{"translation", at(-1, 0.5, 1)}});
+  b.json()["cameras"] = {
+      {{"type", "perspective"}, {"perspective", {{"yfov", 1.0}, {"znear", 0.01 * scale}}}}};
+  b.AddNode({{"camera", 0}, {"translation", at(0, 0, 1.8)}});
+  c.settings = HardSettings(384, 4);
+  return c;
+}
+
 std::vector<Twins> StrategyTwins() {
   std::vector<Twins> twins;
   for (const char* light : {"triangles", "sphere", "two_sided", "environment"}) {
@@ -169,9 +168,11 @@ std::vector<Twins> TransformTwins() {
 
 std::vector<Twins> ScaleTwins() {
   std::vector<Twins> twins;
-  const SceneCase one = Room("row46_room", 1, {0, 0, 0});
+  const SceneCase one = RoomAt(1, {0, 0, 0});
   const auto add = [&](const char* name, double scale, const Point& offset) {
-    twins.push_back({46, one, Room(name, scale, offset), {.precision = 0.02}});
+    SceneCase other = RoomAt(scale, offset);
+    other.name = name;
+    twins.push_back({46, one, other, {.precision = 0.02}});
   };
   add("row46_room_micro", 1e-6, {0, 0, 0});
   add("row46_room_mega", 1e6, {0, 0, 0});

@@ -90,9 +90,36 @@ TEST(Film, RejectsAndCountsWhatIsNotANumberOrTooLarge) {
   EXPECT_EQ(film.Sum(0, 0, 2), 0);
   AddGrey(film, 1, 0, 1e30f);
   EXPECT_EQ(film.Sum(1, 0, 0), kFilmLargest);
-  EXPECT_EQ(film.Rejected(0), 1u);
-  EXPECT_EQ(film.Rejected(1), 1u);
+  const SampleLedger ledger = film.Ledger();
+  EXPECT_EQ(ledger.Count(), 2u);
+  EXPECT_EQ(ledger.Of(SampleFault::not_finite).count, 1u);
+  EXPECT_EQ(ledger.Of(SampleFault::not_finite).pixel, 0u);
+  EXPECT_EQ(ledger.Of(SampleFault::too_large).pixel, 1u);
   EXPECT_EQ(film.Samples(0), 1u);
+}
+
+TEST(Film, TheLedgerKeepsTheFirstOfEachCauseInWhateverOrderTheyCome) {
+  FilmAccumulator film(4, 1, {});
+  for (const auto& [pixel, sample] : {std::pair{2u, 7u}, {3u, 5u}, {1u, 5u}, {0u, 9u}})
+    AddGrey(film, pixel, sample, -1);
+  const SampleLedger::Entry entry = film.Ledger().Of(SampleFault::negative);
+  EXPECT_EQ(entry.count, 4u);
+  EXPECT_EQ(entry.sample, 5u);
+  EXPECT_EQ(entry.pixel, 1u);
+  EXPECT_EQ(film.Sum(3, 5 % kScrambles, 0), -1) << "counted, not hidden";
+}
+
+TEST(Film, TheClampKeepsTheHueAndSaysWhatItRemoved) {
+  FilmAccumulator film(1, 1, {}, 10);
+  const float bright[3] = {40, 20, 0};
+  film.Add(0, 0, bright);
+  AddGrey(film, 0, 4, 10);
+  EXPECT_EQ(film.Sum(0, 0, 0), 20);
+  EXPECT_EQ(film.Sum(0, 0, 1), 15);
+  const SampleLedger ledger = film.Ledger();
+  EXPECT_EQ(ledger.Of(SampleFault::clamped).count, 1u);
+  EXPECT_NEAR(ledger.removed_energy, 0.2126 * 30 + 0.7152 * 15, 1e-9);
+  EXPECT_NEAR(ledger.energy, 0.2126 * 40 + 0.7152 * 20 + 10, 1e-9);
 }
 
 TEST(Film, TakesAtMost128BytesPerPixel) {

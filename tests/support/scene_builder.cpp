@@ -233,8 +233,9 @@ int SceneBuilder::AddPunctual(const nlohmann::json& light, nlohmann::json node) 
 std::filesystem::path SceneBuilder::Write(const std::filesystem::path& folder,
                                           const std::string& name) const {
   nlohmann::json whole = json_;
-  whole["buffers"] = {{{"byteLength", buffer_.size()},
-                       {"uri", "data:application/octet-stream;base64," + Base64(buffer_)}}};
+  if (!buffer_.empty())
+    whole["buffers"] = {{{"byteLength", buffer_.size()},
+                         {"uri", "data:application/octet-stream;base64," + Base64(buffer_)}}};
   const std::filesystem::path path = folder / (name + ".gltf");
   std::ofstream(path) << whole.dump(1);
   return path;

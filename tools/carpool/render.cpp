@@ -25,6 +25,10 @@ ProgressStyle StyleFor(bool quiet, int columns) {
 
 render::ExitCode RenderAndReport(const RenderFlags& flags) {
   const render::RenderSettings settings = Settle(flags);
+  if (flags.explain) {
+    std::fputs(render::ExplainSample(settings, NamedSample(flags), Warn).c_str(), stdout);
+    return render::ExitCode::done;
+  }
   const InterruptGuard interrupt;
   const int columns = TerminalColumns();
   render::ProgressPrinter progress(StyleFor(settings.quiet, columns), columns);

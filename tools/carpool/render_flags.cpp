@@ -67,6 +67,11 @@ void AddSceneFlags(CLI::App& command, RenderFlags& flags) {
                   "vertices before Russian roulette may end dark paths (default: 3)")
       ->type_name("N");
   command
+      .add_option(
+          "--clamp", s.clamp,
+          "scale samples down to this brightest channel; the summary says what that removes")
+      ->type_name("VALUE");
+  command
       .add_option("--direct", flags.direct,
                   "direct light by mis (default), light or bsdf sampling; only the noise differs")
       ->type_name("NAME");
@@ -96,9 +101,13 @@ void AddMachineFlags(CLI::App& command, RenderFlags& flags) {
 
 void AddRunFlags(CLI::App& command, RenderFlags& flags) {
   RenderSettings& s = flags.settings;
+  flags.needs_output = true;
   command.add_option("-o,--output", s.output_path, "the image, an .exr file")
-      ->required()
       ->type_name("FILE.exr");
+  command.add_flag("--explain", flags.explain, "tell one path's story instead of rendering")
+      ->needs(command.add_option("--pixel", flags.pixel, "which pixel's, from the top left")
+                  ->type_name("X,Y"));
+  command.add_option("--sample", flags.sample, "which of its samples (default: 0)")->type_name("N");
   command.add_flag("--no-png", flags.no_png, "write no tone-mapped PNG beside the image");
   command.add_option("--preview", s.preview_path, "a picture refreshed while rendering")
       ->type_name("FILE.png");
@@ -108,6 +117,20 @@ void AddRunFlags(CLI::App& command, RenderFlags& flags) {
   AddMachineFlags(command, flags);
   command.add_option("--stats", s.stats_path, "the run's report as JSON")->type_name("FILE.json");
   command.add_flag("--quiet", s.quiet, "say nothing but errors");
+}
+
+render::SampleName NamedSample(const RenderFlags& flags) {
+  render::SampleName name;
+  name.sample = flags.sample;
+  const char *at = flags.pixel.data(), *end = at + flags.pixel.size();
+  const auto [comma, bad_x] = std::from_chars(at, end, name.x);
+  const bool separated = bad_x == std::errc() && comma != end && *comma == ',';
+  const auto [stop, bad_y] = std::from_chars(separated ? comma + 1 : end, end, name.y);
+  if (!separated || bad_y != std::errc() || stop != end || name.x < 0 || name.y < 0) {
+    throw render::Error(render::ExitCode::usage,
+                        "--pixel: '" + flags.pixel + "' is no pixel; write X,Y, e.g. 10,20");
+  }
+  return name;
 }
 
 RenderSettings Settle(const RenderFlags& flags) {
@@ -120,6 +143,11 @@ RenderSettings Settle(const RenderFlags& flags) {
   s.direct = render::ParseDirectLight(flags.direct);
   s.write_png = !flags.no_png;
   s.robust = !flags.no_robust;
+  if (s.output_path.empty() && !flags.explain && flags.needs_output)
+    throw render::Error(render::ExitCode::usage, "no image given; add -o FILE.exr");
+  if (!flags.pixel.empty() && !flags.explain) {
+    throw render::Error(render::ExitCode::usage, "--pixel names a path to explain; add --explain");
+  }
   const bool other_limit = s.time_seconds > 0 || s.noise_target > 0;
   s.samples = flags.samples.value_or(other_limit ? render::kMaxSamples : render::kDefaultSamples);
   render::CheckSettings(s);

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "render/session/explain.h"
 #include "render/session/settings.h"
 
 namespace CLI {
@@ -19,6 +20,10 @@ struct RenderFlags {
   std::string size, aovs, executor = "auto", policy = "deepest", isa = "auto", direct = "mis";
   std::optional<int> samples;
   bool no_png = false, no_robust = false;
+  std::string pixel;  // "X,Y"
+  uint32_t sample = 0;
+  bool explain = false;
+  bool needs_output = false;  // the command writes an image
 };
 
 /// AddSceneFlags adds what decides which work a render has: scene, view, image, length, executor.
@@ -29,6 +34,9 @@ void AddMachineFlags(CLI::App& command, RenderFlags& flags);
 
 /// AddRunFlags adds these, and where results go.
 void AddRunFlags(CLI::App& command, RenderFlags& flags);
+
+/// The sample that --pixel and --sample name; throws Error(ExitCode::usage) if --pixel is no pixel.
+render::SampleName NamedSample(const RenderFlags& flags);
 
 /// Settle returns the settings the flags ask for; throws Error(ExitCode::usage) for what makes no
 /// sense.

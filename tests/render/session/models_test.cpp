@@ -68,7 +68,7 @@ TEST(Models, RenderTheSameUnderBothExecutors) {
     settings.executor = render::Executor::megakernel;
     const Rendered megakernel = RenderOnce(settings);
     EXPECT_TRUE(AllFinite(wavefront.image));
-    EXPECT_EQ(wavefront.summary.rejected_samples, 0u);
+    EXPECT_EQ(wavefront.summary.ledger.Count(), 0u);
     EXPECT_TRUE(PixelBytes(wavefront.image) == PixelBytes(megakernel.image)) << "executors differ";
   }
 }
