@@ -14,6 +14,9 @@ uint64_t MemoryBytes(const RenderSettings& settings, int threads) {
          (uint64_t{4} << 20) * static_cast<uint64_t>(std::max(0, threads - 2));
 }
 
+// Half a million events: some 75 MB of JSON.
+constexpr size_t kTraceBytes = size_t{16} << 20;
+
 stages::DirectSampling DirectSampling(DirectLight direct) {
   switch (direct) {
     case DirectLight::light:
@@ -112,10 +115,12 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
       kernels_(KernelsFor(settings.isa)),
       bvh_(scene_.tables, scene_.placement, {std::string(Name(settings.isa)), settings.robust}),
       film_(static_cast<uint32_t>(scene_.width), static_cast<uint32_t>(scene_.height), plan_.film),
-      context_(MakeContext(scene_, plan_, settings)) {
+      context_(MakeContext(scene_, plan_, settings)),
+      trace_(settings.trace_path.empty() ? Trace(nullptr) : Trace(kTraceBytes)) {
   context_.trace = bvh_.View();
   context_.film = &film_;
-  const stages::ExecutorOptions options = ExecutorOptionsFor(settings, threads);
+  stages::ExecutorOptions options = ExecutorOptionsFor(settings, threads);
+  options.trace = trace_;
   executor_ =
       plan_.executor == Executor::megakernel
           ? stages::MakeMegakernel(context_, kernels_, options)

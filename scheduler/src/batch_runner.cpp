@@ -21,7 +21,8 @@ BatchRunner::BatchRunner(RunCore& core, std::uint32_t index, BlockSink& sink)
       layout_(core.layout),
       index_(index),
       always_timed_(core.options.deadline || core.linger_ticks != 0 || core.options.progress ||
-                    core.clock.is_virtual()),
+                    core.clock.is_virtual() || core.trace() != nullptr),
+      trace_(core.trace() != nullptr ? &core.trace()->lane(index) : nullptr),
       cache_(core.pool, core.layout),
       credits_(core.credits, core.layout.workers),
       open_(core.layout, core.options.policy, cache_, sink),
@@ -45,6 +46,15 @@ void BatchRunner::run(const Block& block, FlushCause cause, std::uint64_t virtua
       ticks *= ticks < kInterruptedTicks ? tiny_batches_ : 1;
       tiny_batches_ = 0;
     }
+  }
+  if (trace_ != nullptr) {
+    record({.begin = began - virtual_ticks,
+            .end = now_,
+            .node = block.stage,
+            .bin = block.bin,
+            .items = block.items,
+            .kind = TraceEvent::Kind::batch,
+            .cause = cause});
   }
   count(block, cause, ticks);
   const StageLayout& stage = layout_.stages[block.stage];
@@ -77,6 +87,20 @@ RunState::Worker BatchRunner::state() const {
     state.items += stage.items.get();
   }
   return state;
+}
+
+void BatchRunner::record(TraceEvent event) {
+  using Kind = TraceEvent::Kind;
+  if (trace_ == nullptr) {
+    return;
+  }
+  const TraceLog& log = *core_.trace();
+  event.begin = log.time(event.begin);
+  const bool lasts = event.kind == Kind::batch || event.kind == Kind::source ||
+                     event.kind == Kind::search || event.kind == Kind::away;
+  event.end = lasts ? log.time(event.end) : event.end;
+  event.node = event.kind == Kind::steal ? event.node : log.node(event.node);
+  trace_->add(event);
 }
 
 void BatchRunner::count(const Block& block, FlushCause cause, std::uint64_t ticks) {
@@ -113,6 +137,11 @@ void BatchRunner::call_source(std::uint32_t index, std::uint32_t budget,
   ++stats.calls;
   stats.items += open_.emitted_items();
   stats.ticks += now_ - began + virtual_ticks;
+  record({.begin = began - virtual_ticks,
+          .end = now_,
+          .node = node,
+          .items = open_.emitted_items(),
+          .kind = TraceEvent::Kind::source});
 }
 
 }  // namespace carpool

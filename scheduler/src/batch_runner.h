@@ -8,6 +8,7 @@
 #include "open_table.h"
 #include "run_core.h"
 #include "stats.h"
+#include "trace_log.h"
 
 namespace carpool {
 
@@ -36,6 +37,10 @@ class BatchRunner {
   // state is for other threads, at any time; without what is ready.
   RunState::Worker state() const;
 
+  // record adds to the trace, if there is one; times are ticks of the run. trace is where, or null.
+  void record(TraceEvent event);
+  TraceLane* trace() const { return trace_; }
+
   // now returns the ticks at the end of the last timed call.
   std::uint64_t now() const { return now_; }
   void set_now(std::uint64_t ticks) { now_ = ticks; }
@@ -47,6 +52,7 @@ class BatchRunner {
   const Layout& layout_;
   const std::uint32_t index_;
   const bool always_timed_;
+  TraceLane* const trace_;
   BlockCache cache_;
   CreditCache credits_;
   OpenTable open_;

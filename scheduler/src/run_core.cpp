@@ -63,6 +63,7 @@ RunCore::RunCore(const Graph& g, const RunOptions& o, std::uint32_t worker_count
                 : RunClock()),
       linger_ticks(o.mode == RunMode::simulated ? static_cast<std::uint64_t>(o.flush.linger.count())
                                                 : to_ticks(o.flush.linger)),
+      trace_session_(o.trace.log_.get(), g, layout, clock),
       summoner_(summoner),
       allowed_(allowed_edges(g)),
       sources_(g.sources().size()),

@@ -13,6 +13,7 @@
 #include "gate.h"
 #include "layout.h"
 #include "ticks.h"
+#include "trace_log.h"
 
 namespace carpool {
 
@@ -82,6 +83,9 @@ class RunCore {
   Worker& worker(std::uint32_t index) { return *workers_[index]; }
   BlockingWorker& blocking_worker(std::uint32_t index) { return *blocking_workers_[index]; }
 
+  // trace returns the record of this run, or null.
+  TraceLog* trace() const { return trace_session_.log(); }
+
   // allowed_from returns, by stage, whether a node has declared an edge to it; null if it has
   // declared none. Nodes are stages, then sources.
   const std::uint8_t* allowed_from(std::uint32_t node) const {
@@ -113,6 +117,7 @@ class RunCore {
   Outcome outcome() const;
   void add_notes(RunReport& report) const;
 
+  const TraceSession trace_session_;
   Summoner* const summoner_;
   std::vector<std::vector<std::uint8_t>> allowed_;
   std::vector<SourceState> sources_;

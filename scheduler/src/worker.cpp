@@ -21,6 +21,10 @@ constexpr std::uint64_t kSearchTicks = 20'000;
 constexpr std::uint64_t kFirstSharePause = 40'000;
 constexpr std::uint64_t kLongestSharePause = 4'000'000;
 
+// How often each worker samples the counters of a trace.
+constexpr std::uint64_t kSampleTicks = 100'000;
+constexpr std::uint64_t kSampleNanoseconds = 50'000;
+
 }  // namespace
 
 Worker::Worker(RunCore& core, std::uint32_t index)
@@ -32,7 +36,7 @@ Worker::Worker(RunCore& core, std::uint32_t index)
       newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
       plain_(exchange_ == nullptr),
       has_chores_(core.options.progress || core.linger_ticks != 0 ||
-                  core.layout.blocking_threads != 0),
+                  core.layout.blocking_threads != 0 || core.trace() != nullptr),
       runner_(core, index, *this),
       ready_(core.layout.ready_lanes(), core.gate->ready_size(index)),
       next_victim_(index + 1),
@@ -60,6 +64,9 @@ void Worker::serve(bool searching) {
 
 void Worker::begin_shift(bool searching) {
   came_ = search_began_ = core_.clock.ticks();
+  if (runner_.stats().arrivals != 0) {
+    runner_.record({.begin = left_, .end = came_, .kind = TraceEvent::Kind::away});
+  }
   runner_.set_now(came_);
   searching_ = searching;
   runner_.stats().doing.set(searching ? kSearching : kBetweenBatches);
@@ -79,13 +86,13 @@ bool Worker::find(Work& work) {
 
 void Worker::end_shift() {
   runner_.credits().return_all();
-  const std::uint64_t left = core_.clock.ticks();
+  left_ = core_.clock.ticks();
   if (searching_) {
-    runner_.stats().search_ticks += left - search_began_;
+    end_search(left_);
   } else {
     gate_.begin_search();  // leave() expects it
   }
-  runner_.stats().present_ticks += left - came_;
+  runner_.stats().present_ticks += left_ - came_;
   runner_.stats().doing.set(kAway);
 }
 
@@ -177,6 +184,10 @@ bool Worker::steal(Work& work) {
       continue;
     }
     next_victim_ = victim;
+    if (runner_.trace() != nullptr) {
+      runner_.record(
+          {.begin = core_.clock.ticks(), .node = victim, .kind = TraceEvent::Kind::steal});
+    }
     ReadyBlock* rest = list->newer;
     ++runner_.stats().stages[list->block.stage].steals;
     unpack(list, work);
@@ -263,6 +274,31 @@ void Worker::do_chores() {
   }
   if (layout_.blocking_threads != 0) {
     feed_blocking_stages();
+  }
+  if (runner_.trace() != nullptr && runner_.now() >= next_sample_) {
+    sample_queues();
+  }
+}
+
+// The counters of a trace.
+void Worker::sample_queues() {
+  const std::uint64_t now = runner_.now();
+  next_sample_ = now + (core_.clock.is_virtual() ? kSampleNanoseconds : kSampleTicks);
+  const std::int64_t lent = core_.credits.limit() - core_.credits.available();
+  runner_.record({.begin = now,
+                  .end = static_cast<std::uint64_t>(std::max<std::int64_t>(0, lent)),
+                  .kind = TraceEvent::Kind::in_flight});
+  runner_.record({.begin = now,
+                  .bin = runner_.open().count(),
+                  .items = ready_.size(),
+                  .kind = TraceEvent::Kind::queues});
+  for (std::uint32_t stage = 0; stage < layout_.stages.size(); ++stage) {
+    if (layout_.stages[stage].gated) {
+      runner_.record({.begin = now,
+                      .end = exchange_->waiting(stage),
+                      .node = stage,
+                      .kind = TraceEvent::Kind::waiting});
+    }
   }
 }
 
@@ -394,12 +430,17 @@ bool Worker::sees_work() const {
 
 void Worker::found_work() {
   searching_ = false;
-  runner_.stats().search_ticks += core_.clock.ticks() - search_began_;
+  end_search(core_.clock.ticks());
   // Others kept quiet while somebody was searching. If that was the last searcher and there is
   // more, call the next.
   if (gate_.hungry(gate_.end_search()) && gate_.any_ready()) {
     core_.invite();
   }
+}
+
+void Worker::end_search(std::uint64_t ticks) {
+  runner_.stats().search_ticks += ticks - search_began_;
+  runner_.record({.begin = search_began_, .end = ticks, .kind = TraceEvent::Kind::search});
 }
 
 std::uint64_t Worker::drop_all() {

@@ -66,10 +66,12 @@ class Worker final : private BlockSink {
   void do_chores();
   void flush_lingering();
   void feed_blocking_stages();
+  void sample_queues();
   void share();
 
   bool search();
   void found_work();
+  void end_search(std::uint64_t ticks);
 
   void publish(const Block& block, FlushCause cause) override;
   void push_ready(const Block& block, FlushCause cause);
@@ -96,6 +98,8 @@ class Worker final : private BlockSink {
   const std::uint64_t linger_ticks_;
   std::uint64_t search_began_ = 0;
   std::uint64_t came_ = 0;
+  std::uint64_t left_ = 0;         // when the seat was last left
+  std::uint64_t next_sample_ = 0;  // of the counters of a trace
 };
 
 }  // namespace carpool

@@ -37,6 +37,7 @@ struct ExecutorOptions {
   Policy policy = Policy::deepest_first();
   bool bins = true;  // wavefront: false puts all materials and depths in one queue ...
   bool simd = true;  // ... and shades one lane at a time
+  Trace trace = Trace(nullptr);  // records the passes (wavefront)
 };
 
 /// What one pass did.

@@ -14,6 +14,7 @@
 #include "carpool/monitor.h"
 #include "carpool/policy.h"
 #include "carpool/report.h"
+#include "carpool/trace.h"
 
 namespace carpool {
 
@@ -95,6 +96,9 @@ struct RunOptions {
 
   /// Lets other threads look at the run. The default shows nothing.
   Monitor monitor = Monitor(nullptr);
+
+  /// Records the run for a trace viewer. The default records nothing.
+  Trace trace = Trace(nullptr);
 
   /// Called by one worker at a time, between batches, about every `progress_every`. Keep it short.
   /// Exceptions end the run.
