@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "spill.h"
+
 namespace carpool {
 namespace {
 
@@ -60,6 +62,9 @@ void BatchRunner::run(const Block& block, FlushCause cause, std::uint64_t virtua
   const StageLayout& stage = layout_.stages[block.stage];
   credits_.settle(open_.take_spent(), std::int64_t{stage.weight} * block.items);
   cache_.release(stage.levels[block.level].pool_class, block.data);
+  if (block.claimed) {
+    core_.spill->release(block);
+  }
 }
 
 RunState::Worker BatchRunner::state() const {
@@ -87,6 +92,16 @@ RunState::Worker BatchRunner::state() const {
     state.items += stage.items.get();
   }
   return state;
+}
+
+bool BatchRunner::keep(Block& block, FlushCause cause) {
+  const StageLayout& stage = layout_.stages[block.stage];
+  if (!core_.spill || block.claimed || block.items < stage.block_items ||
+      core_.spill->claim(block, cause)) {
+    return true;
+  }
+  cache_.release(stage.levels[block.level].pool_class, block.data);
+  return false;
 }
 
 void BatchRunner::record(TraceEvent event) {

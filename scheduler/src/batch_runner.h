@@ -24,6 +24,10 @@ class BatchRunner {
   // in a simulation. An exception of the kernel passes through; the block is lost then.
   void run(const Block& block, FlushCause cause, std::uint64_t virtual_ticks);
 
+  // keep sees to it that a full block which has left its worker may stay in memory; if not, it has
+  // gone to the file (false).
+  bool keep(Block& block, FlushCause cause);
+
   // call_source calls a source, which must have been entered, and leaves it.
   void call_source(std::uint32_t source, std::uint32_t budget, std::uint64_t virtual_ticks);
 

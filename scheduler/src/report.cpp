@@ -132,6 +132,10 @@ void RunReport::print(std::ostream& out) const {
                 static_cast<double>(peak_bytes) / 1024,
                 static_cast<double>(worst_case_bytes) / 1024, wide(peak_in_flight),
                 wide(in_flight_limit));
+  if (spilled_blocks != 0) {
+    out << format("  spilled: %llu blocks, at most %.1f MiB in the file at once\n",
+                  wide(spilled_blocks), static_cast<double>(peak_spill_bytes) / 1048576);
+  }
   if (dropped_items != 0) {
     out << format("  dropped: %llu items\n", wide(dropped_items));
   }
@@ -156,6 +160,8 @@ std::string RunReport::to_json(std::size_t max_bins) const {
   json.count("peak_in_flight", peak_in_flight);
   json.count("in_flight_limit", in_flight_limit);
   json.count("overflow_blocks", overflow_blocks);
+  json.count("spilled_blocks", spilled_blocks);
+  json.count("peak_spill_bytes", peak_spill_bytes);
   json.count("dropped_items", dropped_items);
   write_json_list(json.name("stages"), stages,
                   [&](const StageReport& stage) { write_stage(out, stage, max_bins); });

@@ -19,6 +19,7 @@ namespace carpool {
 
 class BlockingWorker;
 class Exchange;
+class Spill;
 class Worker;
 
 // Summoner brings a thread to the run after Gate::invite() has booked an invitation for a helper.
@@ -68,6 +69,9 @@ class RunCore {
   bool try_enter_source(std::uint32_t source);
   void leave_source(std::uint32_t source, bool exhausted);
 
+  // wants_a_worker tells whether a worker should look: at a source, or at what was spilled.
+  bool wants_a_worker() const;
+
   // source_ready tells whether a source could be called now with what is in the common purse.
   bool source_ready() const;
   bool sources_open() const {
@@ -101,6 +105,7 @@ class RunCore {
   const std::shared_ptr<Gate> gate;
   Credits credits;
   BlockPool pool;
+  const std::unique_ptr<Spill> spill;        // null without Overflow::spill
   const std::unique_ptr<Exchange> exchange;  // null if no stage needs one
   RunClock clock;
   const std::uint64_t linger_ticks;  // FlushOptions::linger

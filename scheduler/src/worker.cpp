@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "spill.h"
 #include "spin_lock.h"
 #include "ticks.h"
 
@@ -34,7 +35,7 @@ Worker::Worker(RunCore& core, std::uint32_t index)
       exchange_(core.exchange.get()),
       index_(index),
       newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
-      plain_(exchange_ == nullptr),
+      plain_(exchange_ == nullptr && !core.spill),
       has_chores_(core.options.progress || core.linger_ticks != 0 ||
                   core.layout.blocking_threads != 0 || core.trace() != nullptr),
       runner_(core, index, *this),
@@ -109,7 +110,7 @@ RunState::Worker Worker::state() const {
 // others, who need time to come; and new items once more, one by one if need be.
 bool Worker::acquire(Work& work) {
   return take_ready(work, offers_stand() ? layout_.lanes : layout_.ready_lanes()) ||
-         (!plain_ && take_landed(work)) || take_source(work, false) || steal(work) ||
+         (!plain_ && take_from_outside(work)) || take_source(work, false) || steal(work) ||
          take_open(work) || take_ready(work, layout_.ready_lanes()) || take_source(work, true);
 }
 
@@ -212,16 +213,34 @@ bool Worker::take_open(Work& work) {
 
 bool Worker::take_open_that_leaves_freely(Work& work) {
   while (runner_.open().take_best(work.block)) {
-    if (leaves_freely(work.block, work.cause)) {
+    // What runs at once needs no place to wait.
+    if (!layout_.stages[work.block.stage].gated || leaves_freely(work.block, work.cause)) {
       return true;
     }
   }
   return false;
 }
 
-// False if the exchange has kept the block.
-bool Worker::leaves_freely(const Block& block, FlushCause cause) {
-  return !layout_.stages[block.stage].gated || exchange_->admit(block, cause);
+// False if the block has gone to the file or to the exchange.
+bool Worker::leaves_freely(Block& block, FlushCause cause) {
+  return runner_.keep(block, cause) &&
+         (!layout_.stages[block.stage].gated || exchange_->admit(block, cause));
+}
+
+bool Worker::take_spilled(Work& work) {
+  work.is_source = false;
+  work.stolen = false;
+  while (core_.spill->read_back(runner_.cache(), work.block, work.cause)) {
+    if (!layout_.stages[work.block.stage].gated || exchange_->admit(work.block, work.cause)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// What waits outside of the workers: landed or spilled.
+bool Worker::take_from_outside(Work& work) {
+  return (exchange_ != nullptr && take_landed(work)) || (core_.spill && take_spilled(work));
 }
 
 bool Worker::take_landed(Work& work) {
@@ -338,7 +357,7 @@ void Worker::share() {
       publish(block, FlushCause::asked);
       ++shared_;
     }
-  } else if (ready_.size() != 0 || core_.source_ready()) {
+  } else if (ready_.size() != 0 || core_.wants_a_worker()) {
     core_.invite();
   }
 }
@@ -347,8 +366,13 @@ void Worker::publish(const Block& block, FlushCause cause) {
   // Before others can retire these items: what they give back must have been taken, or a source
   // would find credits that nobody has given back yet.
   runner_.credits().settle(runner_.open().take_spent(), 0);
-  if (plain_ || leaves_freely(block, cause)) {
+  if (plain_) {
     push_ready(block, cause);
+    return;
+  }
+  Block leaving = block;
+  if (leaves_freely(leaving, cause)) {
+    push_ready(leaving, cause);
   }
 }
 
@@ -405,16 +429,14 @@ bool Worker::search() {
 
 bool Worker::begin_search() {
   runner_.credits().return_all();  // before looking at the sources: see Gate
-  if (exchange_ != nullptr) {
-    exchange_->take_errand();  // which is to look at the sources
-  }
+  const bool errand = exchange_ != nullptr && exchange_->take_errand();
   if (!searching_) {
     searching_ = true;
     runner_.stats().doing.set(kSearching);
     search_began_ = core_.clock.ticks();
     gate_.begin_search();
   }
-  return core_.source_ready();
+  return errand || core_.source_ready();
 }
 
 bool Worker::search_goes_on() const {
@@ -425,7 +447,7 @@ bool Worker::search_goes_on() const {
 }
 
 bool Worker::sees_work() const {
-  return gate_.any_ready() || core_.source_ready();
+  return gate_.any_ready() || core_.wants_a_worker();
 }
 
 void Worker::found_work() {

@@ -56,9 +56,11 @@ class Worker final : private BlockSink {
   bool take_source(Work& work, bool last_resort);
   bool steal(Work& work);
   bool take_open(Work& work);
+  bool take_from_outside(Work& work);
   bool take_landed(Work& work);
+  bool take_spilled(Work& work);
   bool take_open_that_leaves_freely(Work& work);
-  bool leaves_freely(const Block& block, FlushCause cause);
+  bool leaves_freely(Block& block, FlushCause cause);
   void unpack(ReadyBlock* ready, Work& work);
 
   void pass_token_on(std::uint32_t stage);
