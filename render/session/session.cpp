@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <sstream>
 
 #include "render/film/resolve.h"
 #include "render/posix/atomic_file.h"
@@ -152,7 +153,8 @@ class PassLoop {
 void CheckOutputs(const RenderSettings& settings) {
   CheckWritable(settings.output_path);
   if (settings.write_png) CheckWritable(PngPath(settings.output_path));
-  for (const std::string& path : {settings.preview_path, settings.stats_path}) {
+  for (const std::string& path :
+       {settings.preview_path, settings.stats_path, settings.trace_path}) {
     if (!path.empty()) CheckWritable(path);
   }
 }
@@ -181,6 +183,11 @@ void Save(const Workspace& w, const RenderSettings& settings, RenderSummary& sum
     WritePicture(PngPath(settings.output_path), w.film(), settings.exposure, false);
   summary.save_seconds = SecondsSince(begin);
   if (!settings.stats_path.empty()) WriteText(settings.stats_path, summary.Json());
+  if (!settings.trace_path.empty()) {
+    std::ostringstream text;
+    w.trace().write(text);
+    WriteText(settings.trace_path, text.str());
+  }
 }
 
 }  // namespace

@@ -85,6 +85,9 @@ void CheckPaths(const RenderSettings& s) {
   if (!s.preview_path.empty() && !EndsWith(s.preview_path, ".png")) {
     Refuse("--preview: '" + s.preview_path + "' must end in .png");
   }
+  if (!s.trace_path.empty() && s.executor == Executor::megakernel) {
+    Refuse("--trace: the megakernel has no stages to show; use --executor wavefront");
+  }
 }
 
 }  // namespace

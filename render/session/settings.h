@@ -111,6 +111,9 @@ struct RenderSettings {
 
   bool quiet = false;           ///< errors only: neither progress nor warnings
   std::string stats_path = {};  ///< the run's report as JSON; empty: none
+  /// When each worker did what, for ui.perfetto.dev; empty: none. Not for the megakernel, which has
+  /// no stages.
+  std::string trace_path = {};
 };
 
 /// CheckSettings throws Error(ExitCode::usage), one line naming the flag, if a value is out of its

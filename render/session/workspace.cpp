@@ -20,6 +20,9 @@ float ClampOf(const RenderSettings& settings) {
                             : std::numeric_limits<float>::infinity();
 }
 
+// Half a million events: some 75 MB of JSON.
+constexpr size_t kTraceBytes = size_t{16} << 20;
+
 stages::DirectSampling DirectSampling(DirectLight direct) {
   switch (direct) {
     case DirectLight::light:
@@ -119,10 +122,12 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
       bvh_(scene_.tables, scene_.placement, {std::string(Name(settings.isa)), settings.robust}),
       film_(static_cast<uint32_t>(scene_.width), static_cast<uint32_t>(scene_.height), plan_.film,
             ClampOf(settings)),
-      context_(MakeContext(scene_, plan_, settings)) {
+      context_(MakeContext(scene_, plan_, settings)),
+      trace_(settings.trace_path.empty() ? Trace(nullptr) : Trace(kTraceBytes)) {
   context_.trace = bvh_.View();
   context_.film = &film_;
-  const stages::ExecutorOptions options = ExecutorOptionsFor(settings, threads);
+  stages::ExecutorOptions options = ExecutorOptionsFor(settings, threads);
+  options.trace = trace_;
   executor_ =
       plan_.executor == Executor::megakernel
           ? stages::MakeMegakernel(context_, kernels_, options)

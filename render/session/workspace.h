@@ -57,6 +57,7 @@ class Workspace {
   const stages::FilmAccumulator& film() const { return film_; }
   stages::Executor& executor() { return *executor_; }
   const Bvh& bvh() const { return bvh_; }
+  const Trace& trace() const { return trace_; }
 
  private:
   PreparedScene scene_;
@@ -65,6 +66,7 @@ class Workspace {
   Bvh bvh_;
   stages::FilmAccumulator film_;
   stages::KernelContext context_;
+  Trace trace_;
   std::unique_ptr<stages::Executor> executor_;
 };
 

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "spill.h"
+
 namespace carpool {
 namespace {
 
@@ -21,7 +23,8 @@ BatchRunner::BatchRunner(RunCore& core, std::uint32_t index, BlockSink& sink)
       layout_(core.layout),
       index_(index),
       always_timed_(core.options.deadline || core.linger_ticks != 0 || core.options.progress ||
-                    core.clock.is_virtual()),
+                    core.clock.is_virtual() || core.trace() != nullptr),
+      trace_(core.trace() != nullptr ? &core.trace()->lane(index) : nullptr),
       cache_(core.pool, core.layout),
       credits_(core.credits, core.layout.workers),
       open_(core.layout, core.options.policy, cache_, sink),
@@ -46,10 +49,22 @@ void BatchRunner::run(const Block& block, FlushCause cause, std::uint64_t virtua
       tiny_batches_ = 0;
     }
   }
+  if (trace_ != nullptr) {
+    record({.begin = began - virtual_ticks,
+            .end = now_,
+            .node = block.stage,
+            .bin = block.bin,
+            .items = block.items,
+            .kind = TraceEvent::Kind::batch,
+            .cause = cause});
+  }
   count(block, cause, ticks);
   const StageLayout& stage = layout_.stages[block.stage];
   credits_.settle(open_.take_spent(), std::int64_t{stage.weight} * block.items);
   cache_.release(stage.levels[block.level].pool_class, block.data);
+  if (block.claimed) {
+    core_.spill->release(block);
+  }
 }
 
 RunState::Worker BatchRunner::state() const {
@@ -77,6 +92,30 @@ RunState::Worker BatchRunner::state() const {
     state.items += stage.items.get();
   }
   return state;
+}
+
+bool BatchRunner::keep(Block& block, FlushCause cause) {
+  const StageLayout& stage = layout_.stages[block.stage];
+  if (!core_.spill || block.claimed || block.items < stage.block_items ||
+      core_.spill->claim(block, cause)) {
+    return true;
+  }
+  cache_.release(stage.levels[block.level].pool_class, block.data);
+  return false;
+}
+
+void BatchRunner::record(TraceEvent event) {
+  using Kind = TraceEvent::Kind;
+  if (trace_ == nullptr) {
+    return;
+  }
+  const TraceLog& log = *core_.trace();
+  event.begin = log.time(event.begin);
+  const bool lasts = event.kind == Kind::batch || event.kind == Kind::source ||
+                     event.kind == Kind::search || event.kind == Kind::away;
+  event.end = lasts ? log.time(event.end) : event.end;
+  event.node = event.kind == Kind::steal ? event.node : log.node(event.node);
+  trace_->add(event);
 }
 
 void BatchRunner::count(const Block& block, FlushCause cause, std::uint64_t ticks) {
@@ -113,6 +152,11 @@ void BatchRunner::call_source(std::uint32_t index, std::uint32_t budget,
   ++stats.calls;
   stats.items += open_.emitted_items();
   stats.ticks += now_ - began + virtual_ticks;
+  record({.begin = began - virtual_ticks,
+          .end = now_,
+          .node = node,
+          .items = open_.emitted_items(),
+          .kind = TraceEvent::Kind::source});
 }
 
 }  // namespace carpool

@@ -8,6 +8,7 @@
 #include "open_table.h"
 #include "run_core.h"
 #include "stats.h"
+#include "trace_log.h"
 
 namespace carpool {
 
@@ -23,6 +24,10 @@ class BatchRunner {
   // in a simulation. An exception of the kernel passes through; the block is lost then.
   void run(const Block& block, FlushCause cause, std::uint64_t virtual_ticks);
 
+  // keep sees to it that a full block which has left its worker may stay in memory; if not, it has
+  // gone to the file (false).
+  bool keep(Block& block, FlushCause cause);
+
   // call_source calls a source, which must have been entered, and leaves it.
   void call_source(std::uint32_t source, std::uint32_t budget, std::uint64_t virtual_ticks);
 
@@ -36,6 +41,10 @@ class BatchRunner {
   // state is for other threads, at any time; without what is ready.
   RunState::Worker state() const;
 
+  // record adds to the trace, if there is one; times are ticks of the run. trace is where, or null.
+  void record(TraceEvent event);
+  TraceLane* trace() const { return trace_; }
+
   // now returns the ticks at the end of the last timed call.
   std::uint64_t now() const { return now_; }
   void set_now(std::uint64_t ticks) { now_ = ticks; }
@@ -47,6 +56,7 @@ class BatchRunner {
   const Layout& layout_;
   const std::uint32_t index_;
   const bool always_timed_;
+  TraceLane* const trace_;
   BlockCache cache_;
   CreditCache credits_;
   OpenTable open_;

@@ -17,6 +17,7 @@ struct Block {
   std::uint32_t stage = 0;
   std::uint32_t bin = 0;
   std::uint8_t level = 0;
+  bool claimed = false;  // see Spill
 };
 
 // ReadyBlock is a published block. It lives in a block of its own from the pool.

@@ -46,14 +46,14 @@ void BlockPool::add_slab(std::uint32_t pool_class, Class& c, std::uint32_t wante
   if (c.made + count > limits.limit) {
     if (c.made < limits.limit) {
       count = limits.limit - c.made;
-    } else if (overflow_ == Overflow::fail) {
+    } else if (overflow_ != Overflow::grow) {
       throw OverflowError(
           "carpool: a kernel made more live items than its source's fan_out (or its stage's "
           "weight) "
           "declares: the run has used all " +
           std::to_string(limits.limit) + " blocks of " + std::to_string(bytes) +
           " bytes that worst_case_bytes() counts. Declare the true fan-out, or "
-          "choose Overflow::grow");
+          "choose Overflow::spill or grow");
     } else {
       overflowed_.fetch_add(count, std::memory_order_relaxed);  // a statistic
     }

@@ -33,7 +33,7 @@ void BlockingWorker::perform(std::uint64_t virtual_ticks) {
   }
   runner_.credits().return_all();  // before looking at the sources: see Gate
   runner_.stats().doing.set(kAway);
-  core_.exchange->finish_call(stage_, core_.source_ready());
+  core_.exchange->finish_call(stage_, core_.wants_a_worker());
   if (core_.gate->hungry(core_.gate->view())) {
     core_.invite();
   }
@@ -41,7 +41,11 @@ void BlockingWorker::perform(std::uint64_t virtual_ticks) {
 
 void BlockingWorker::publish(const Block& block, FlushCause cause) {
   runner_.credits().settle(runner_.open().take_spent(), 0);  // before: see Worker::publish
-  core_.exchange->land(block, cause);
+  Block kept = block;
+  if (!runner_.keep(kept, cause)) {
+    return;  // finish_call() sends a worker for it
+  }
+  core_.exchange->land(kept, cause);
   if (core_.gate->hungry(core_.gate->view())) {
     core_.invite();
   }

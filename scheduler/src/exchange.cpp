@@ -4,12 +4,14 @@
 #include <new>
 
 #include "run_core.h"
+#include "spill.h"
 
 namespace carpool {
 
-Exchange::Exchange(const Layout& layout, const Policy& policy, BlockPool& pool, Gate& gate,
-                   Summoner* summoner)
+Exchange::Exchange(const Layout& layout, const Policy& policy, BlockPool& pool, Spill* spill,
+                   Gate& gate, Summoner* summoner)
     : layout_(layout),
+      spill_(spill),
       gate_(gate),
       summoner_(summoner),
       cache_(pool, layout),
@@ -115,18 +117,28 @@ std::uint64_t Exchange::items() const {
 
 void Exchange::keep(const Block& block, FlushCause cause) {
   const StageLayout& stage = layout_.stages[block.stage];
+  add_items(lots_[block.stage], block.items);
   if (block.items == stage.block_items) {
-    publish(block, cause);
+    append(block, cause);
   } else {
     open_.absorb(block);
     cache_.release(stage.levels[block.level].pool_class, block.data);
   }
-  add_items(lots_[block.stage], block.items);
   update(block.stage);
 }
 
-// Takes a full block, also one that merging has filled.
+// Gets the blocks that merging has filled.
 void Exchange::publish(const Block& block, FlushCause cause) {
+  Block full = block;
+  if (spill_ == nullptr || spill_->claim(full, cause)) {
+    append(full, cause);
+  } else {
+    add_items(lots_[block.stage], -std::int64_t{block.items});
+    cache_.release(layout_.stages[block.stage].levels[block.level].pool_class, block.data);
+  }
+}
+
+void Exchange::append(const Block& block, FlushCause cause) {
   auto* ready = ::new (cache_.allocate(layout_.node_class)) ReadyBlock;
   ready->block = block;
   ready->cause = cause;

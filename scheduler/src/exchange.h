@@ -15,6 +15,7 @@
 
 namespace carpool {
 
+class Spill;
 class Summoner;
 
 // Exchange keeps, by stage, full blocks in order of arrival, and merges partial ones bin by bin, so
@@ -31,7 +32,8 @@ class Summoner;
 // Thread-safe: one mutex, taken once per block of these stages only.
 class Exchange final : private BlockSink {
  public:
-  Exchange(const Layout& layout, const Policy& policy, BlockPool& pool, Gate& gate,
+  // `spill` may be null.
+  Exchange(const Layout& layout, const Policy& policy, BlockPool& pool, Spill* spill, Gate& gate,
            Summoner* summoner);
 
   // admit offers a block of a gated stage. True: it got a token, and the caller publishes it.
@@ -45,8 +47,8 @@ class Exchange final : private BlockSink {
   // take_landed takes a block for a worker to run; the highest rank first, full ones first.
   bool take_landed(Block& block, FlushCause& cause);
 
-  // take_errand tells whether a blocking thread has freed credits that a source waits for, and
-  // forgets it: the caller looks at the sources now.
+  // take_errand tells whether a blocking thread has freed what a source or a spilled block waits
+  // for, and forgets it: the caller looks at those now.
   bool take_errand();
 
   // For the threads of blocking stages: take_waiting begins a call, land hands over what it
@@ -76,6 +78,7 @@ class Exchange final : private BlockSink {
   };
 
   void publish(const Block& block, FlushCause cause) override;
+  void append(const Block& block, FlushCause cause);
   void keep(const Block& block, FlushCause cause);
   Block take_from(std::uint32_t stage, FlushCause& cause);
   void add_items(Lot& lot, std::int64_t items);
@@ -83,6 +86,7 @@ class Exchange final : private BlockSink {
   void update_hold();
 
   const Layout& layout_;
+  Spill* const spill_;
   Gate& gate_;
   Summoner* const summoner_;
   std::mutex mutex_;

@@ -51,7 +51,7 @@ Layout::Layout(const Graph& graph, const RunOptions& options, std::uint32_t work
       break;
   }
   build_levels(graph, options);
-  limit_classes();
+  limit_classes(options.overflow == Overflow::spill);
 }
 
 void Layout::set_caps(const Graph& graph, const RunOptions& options) {
@@ -206,12 +206,16 @@ std::uint32_t Layout::class_of(std::uint32_t bytes) const {
 }
 
 // The derivation is in README.md, section "Memory".
-void Layout::limit_classes() {
+void Layout::limit_classes(bool spill) {
   std::uint64_t partials = std::uint64_t{workers} * kPartialsPerWorker;
   for (const StageLayout& stage : stages) {
     partials += stage.cap;  // one for each token
   }
   const std::uint64_t holders = this->holders();
+  // With a file to spill to, live items are not limited, but all full blocks beyond those that the
+  // credits would allow are in the file.
+  const std::uint64_t live = spill ? ~std::uint64_t{0} : in_flight;
+  std::uint64_t nodes = 0;
   std::uint64_t shortest = kMaxCredits;
   for (const StageLayout& stage : stages) {
     shortest = std::min<std::uint64_t>(shortest, stage.block_items);
@@ -235,18 +239,20 @@ void Layout::limit_classes() {
       bins += stage.bins;
       fewest = std::min(fewest, least);
       if (stage.levels[stage.top_level].pool_class == c) {
-        full = std::max(full, in_flight / stage.block_items);
+        full =
+            std::max(full, std::max<std::uint64_t>(spill ? 1 : 0, in_flight / stage.block_items));
       }
     }
     if (used) {
-      const std::uint64_t open = std::min(bins * holders + partials, in_flight / fewest);
+      const std::uint64_t open = std::min(bins * holders + partials, live / fewest);
       // Each holder may be running one block, and be copying into another.
+      classes[c].full = full;
+      nodes += full;
       classes[c].limit = open + full + holders * (2 + classes[c].cache);
     }
-    if (c == node_class) {
-      classes[c].limit += partials + in_flight / shortest + holders * (2 + classes[c].cache);
-    }
   }
+  nodes = spill ? nodes : in_flight / shortest;
+  classes[node_class].limit += partials + nodes + holders * (2 + classes[node_class].cache);
 }
 
 std::size_t Layout::table_bytes() const {

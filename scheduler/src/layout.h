@@ -56,6 +56,7 @@ struct SourceLayout {
 struct PoolClass {
   std::uint32_t bytes = 0;
   std::uint32_t cache = 0;  // how many free ones a worker may keep
+  std::uint64_t full = 0;   // how many of those are for full blocks that wait to be run
   std::uint64_t limit = 0;  // how many there may be
 };
 
@@ -97,7 +98,7 @@ struct Layout {
   void order_by_rank(const Graph& graph);
   void build_levels(const Graph& graph, const RunOptions& options);
   void build_ladder(StageLayout& stage, std::uint64_t thrift, bool fine) const;
-  void limit_classes();
+  void limit_classes(bool spill);
   std::uint32_t class_of(std::uint32_t bytes) const;
 };
 

@@ -5,6 +5,8 @@
 #include <ostream>
 #include <sstream>
 
+#include "json.h"
+
 namespace carpool {
 
 const char* to_string(FlushCause cause) {
@@ -50,52 +52,6 @@ unsigned long long wide(std::uint64_t value) {
   return value;
 }
 
-std::string escaped(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      result += '\\';
-      result += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      result += format("\\u%04x", static_cast<unsigned>(c));
-    } else {
-      result += c;
-    }
-  }
-  return result + '"';
-}
-
-// JsonObject writes the members of one object, with commas between them.
-class JsonObject {
- public:
-  explicit JsonObject(std::ostream& out) : out_(out) { out_ << '{'; }
-  void text(const char* key, const std::string& value) { name(key) << escaped(value); }
-  void number(const char* key, double value) { name(key) << format("%.9g", value); }
-  void count(const char* key, std::uint64_t value) { name(key) << value; }
-  std::ostream& name(const char* key) {
-    out_ << (first_ ? "" : ",") << '"' << key << "\":";
-    first_ = false;
-    return out_;
-  }
-  void end() { out_ << '}'; }
-
- private:
-  std::ostream& out_;
-  bool first_ = true;
-};
-
-template <class Range, class Write>
-void write_list(std::ostream& out, const Range& range, Write write) {
-  out << '[';
-  bool first = true;
-  for (const auto& element : range) {
-    out << (first ? "" : ",");
-    first = false;
-    write(element);
-  }
-  out << ']';
-}
-
 void write_stage(std::ostream& out, const StageReport& stage, std::size_t max_bins) {
   JsonObject json(out);
   json.text("name", stage.name);
@@ -111,7 +67,7 @@ void write_stage(std::ostream& out, const StageReport& stage, std::size_t max_bi
   }
   causes.end();
   if (stage.bins.size() <= max_bins) {
-    write_list(json.name("bins"), stage.bins, [&](const BinReport& bin) {
+    write_json_list(json.name("bins"), stage.bins, [&](const BinReport& bin) {
       JsonObject entry(out);
       entry.count("batches", bin.batches);
       entry.count("items", bin.items);
@@ -176,6 +132,10 @@ void RunReport::print(std::ostream& out) const {
                 static_cast<double>(peak_bytes) / 1024,
                 static_cast<double>(worst_case_bytes) / 1024, wide(peak_in_flight),
                 wide(in_flight_limit));
+  if (spilled_blocks != 0) {
+    out << format("  spilled: %llu blocks, at most %.1f MiB in the file at once\n",
+                  wide(spilled_blocks), static_cast<double>(peak_spill_bytes) / 1048576);
+  }
   if (dropped_items != 0) {
     out << format("  dropped: %llu items\n", wide(dropped_items));
   }
@@ -200,16 +160,19 @@ std::string RunReport::to_json(std::size_t max_bins) const {
   json.count("peak_in_flight", peak_in_flight);
   json.count("in_flight_limit", in_flight_limit);
   json.count("overflow_blocks", overflow_blocks);
+  json.count("spilled_blocks", spilled_blocks);
+  json.count("peak_spill_bytes", peak_spill_bytes);
   json.count("dropped_items", dropped_items);
-  write_list(json.name("stages"), stages,
-             [&](const StageReport& stage) { write_stage(out, stage, max_bins); });
-  write_list(json.name("sources"), sources,
-             [&](const SourceReport& source) { write_source(out, source); });
-  write_list(json.name("workers"), workers,
-             [&](const WorkerReport& worker) { write_worker(out, worker); });
-  write_list(json.name("blocking_threads"), blocking_threads,
-             [&](const WorkerReport& thread) { write_worker(out, thread); });
-  write_list(json.name("notes"), notes, [&](const std::string& note) { out << escaped(note); });
+  write_json_list(json.name("stages"), stages,
+                  [&](const StageReport& stage) { write_stage(out, stage, max_bins); });
+  write_json_list(json.name("sources"), sources,
+                  [&](const SourceReport& source) { write_source(out, source); });
+  write_json_list(json.name("workers"), workers,
+                  [&](const WorkerReport& worker) { write_worker(out, worker); });
+  write_json_list(json.name("blocking_threads"), blocking_threads,
+                  [&](const WorkerReport& thread) { write_worker(out, thread); });
+  write_json_list(json.name("notes"), notes,
+                  [&](const std::string& note) { out << json_string(note); });
   json.end();
   return out.str();
 }

@@ -6,6 +6,7 @@
 
 #include "blocking_worker.h"
 #include "exchange.h"
+#include "spill.h"
 #include "worker.h"
 
 namespace carpool {
@@ -55,14 +56,17 @@ RunCore::RunCore(const Graph& g, const RunOptions& o, std::uint32_t worker_count
       gate(std::make_shared<Gate>(worker_count)),
       credits(o.in_flight),
       pool(layout, o.overflow),
-      exchange(layout.has_exchange
-                   ? std::make_unique<Exchange>(layout, o.policy, pool, *gate, summoner)
-                   : nullptr),
+      spill(o.overflow == Overflow::spill ? std::make_unique<Spill>(layout, o.spill_folder)
+                                          : nullptr),
+      exchange(layout.has_exchange ? std::make_unique<Exchange>(layout, o.policy, pool, spill.get(),
+                                                                *gate, summoner)
+                                   : nullptr),
       clock(o.mode == RunMode::simulated
                 ? RunClock(o.simulation.start.value_or(std::chrono::steady_clock::now()))
                 : RunClock()),
       linger_ticks(o.mode == RunMode::simulated ? static_cast<std::uint64_t>(o.flush.linger.count())
                                                 : to_ticks(o.flush.linger)),
+      trace_session_(o.trace.log_.get(), g, layout, clock),
       summoner_(summoner),
       allowed_(allowed_edges(g)),
       sources_(g.sources().size()),
@@ -150,6 +154,10 @@ void RunCore::leave_source(std::uint32_t index, bool exhausted) {
     open_sources_.fetch_sub(1, std::memory_order_relaxed);
   }
   source.inside.fetch_sub(1, std::memory_order_release);  // release: pairs with the next entry
+}
+
+bool RunCore::wants_a_worker() const {
+  return source_ready() || (spill && spill->blocks() != 0);
 }
 
 bool RunCore::source_ready() const {
@@ -330,6 +338,11 @@ RunReport RunCore::report() {
   }
   for (const auto& worker : blocking_workers_) {
     report.dropped_items += worker->dropped();
+  }
+  if (spill) {
+    report.spilled_blocks = spill->written();
+    report.peak_spill_bytes = spill->peak_bytes();
+    report.dropped_items += spill->items();
   }
   report.dropped_items += exchange ? exchange->items() : 0;
   add_notes(report);

@@ -13,11 +13,13 @@
 #include "gate.h"
 #include "layout.h"
 #include "ticks.h"
+#include "trace_log.h"
 
 namespace carpool {
 
 class BlockingWorker;
 class Exchange;
+class Spill;
 class Worker;
 
 // Summoner brings a thread to the run after Gate::invite() has booked an invitation for a helper.
@@ -67,6 +69,9 @@ class RunCore {
   bool try_enter_source(std::uint32_t source);
   void leave_source(std::uint32_t source, bool exhausted);
 
+  // wants_a_worker tells whether a worker should look: at a source, or at what was spilled.
+  bool wants_a_worker() const;
+
   // source_ready tells whether a source could be called now with what is in the common purse.
   bool source_ready() const;
   bool sources_open() const {
@@ -81,6 +86,9 @@ class RunCore {
 
   Worker& worker(std::uint32_t index) { return *workers_[index]; }
   BlockingWorker& blocking_worker(std::uint32_t index) { return *blocking_workers_[index]; }
+
+  // trace returns the record of this run, or null.
+  TraceLog* trace() const { return trace_session_.log(); }
 
   // allowed_from returns, by stage, whether a node has declared an edge to it; null if it has
   // declared none. Nodes are stages, then sources.
@@ -97,6 +105,7 @@ class RunCore {
   const std::shared_ptr<Gate> gate;
   Credits credits;
   BlockPool pool;
+  const std::unique_ptr<Spill> spill;        // null without Overflow::spill
   const std::unique_ptr<Exchange> exchange;  // null if no stage needs one
   RunClock clock;
   const std::uint64_t linger_ticks;  // FlushOptions::linger
@@ -113,6 +122,7 @@ class RunCore {
   Outcome outcome() const;
   void add_notes(RunReport& report) const;
 
+  const TraceSession trace_session_;
   Summoner* const summoner_;
   std::vector<std::vector<std::uint8_t>> allowed_;
   std::vector<SourceState> sources_;

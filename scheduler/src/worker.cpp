@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "spill.h"
 #include "spin_lock.h"
 #include "ticks.h"
 
@@ -21,6 +22,10 @@ constexpr std::uint64_t kSearchTicks = 20'000;
 constexpr std::uint64_t kFirstSharePause = 40'000;
 constexpr std::uint64_t kLongestSharePause = 4'000'000;
 
+// How often each worker samples the counters of a trace.
+constexpr std::uint64_t kSampleTicks = 100'000;
+constexpr std::uint64_t kSampleNanoseconds = 50'000;
+
 }  // namespace
 
 Worker::Worker(RunCore& core, std::uint32_t index)
@@ -30,9 +35,9 @@ Worker::Worker(RunCore& core, std::uint32_t index)
       exchange_(core.exchange.get()),
       index_(index),
       newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
-      plain_(exchange_ == nullptr),
+      plain_(exchange_ == nullptr && !core.spill),
       has_chores_(core.options.progress || core.linger_ticks != 0 ||
-                  core.layout.blocking_threads != 0),
+                  core.layout.blocking_threads != 0 || core.trace() != nullptr),
       runner_(core, index, *this),
       ready_(core.layout.ready_lanes(), core.gate->ready_size(index)),
       next_victim_(index + 1),
@@ -60,6 +65,9 @@ void Worker::serve(bool searching) {
 
 void Worker::begin_shift(bool searching) {
   came_ = search_began_ = core_.clock.ticks();
+  if (runner_.stats().arrivals != 0) {
+    runner_.record({.begin = left_, .end = came_, .kind = TraceEvent::Kind::away});
+  }
   runner_.set_now(came_);
   searching_ = searching;
   runner_.stats().doing.set(searching ? kSearching : kBetweenBatches);
@@ -79,13 +87,13 @@ bool Worker::find(Work& work) {
 
 void Worker::end_shift() {
   runner_.credits().return_all();
-  const std::uint64_t left = core_.clock.ticks();
+  left_ = core_.clock.ticks();
   if (searching_) {
-    runner_.stats().search_ticks += left - search_began_;
+    end_search(left_);
   } else {
     gate_.begin_search();  // leave() expects it
   }
-  runner_.stats().present_ticks += left - came_;
+  runner_.stats().present_ticks += left_ - came_;
   runner_.stats().doing.set(kAway);
 }
 
@@ -102,7 +110,7 @@ RunState::Worker Worker::state() const {
 // others, who need time to come; and new items once more, one by one if need be.
 bool Worker::acquire(Work& work) {
   return take_ready(work, offers_stand() ? layout_.lanes : layout_.ready_lanes()) ||
-         (!plain_ && take_landed(work)) || take_source(work, false) || steal(work) ||
+         (!plain_ && take_from_outside(work)) || take_source(work, false) || steal(work) ||
          take_open(work) || take_ready(work, layout_.ready_lanes()) || take_source(work, true);
 }
 
@@ -177,6 +185,10 @@ bool Worker::steal(Work& work) {
       continue;
     }
     next_victim_ = victim;
+    if (runner_.trace() != nullptr) {
+      runner_.record(
+          {.begin = core_.clock.ticks(), .node = victim, .kind = TraceEvent::Kind::steal});
+    }
     ReadyBlock* rest = list->newer;
     ++runner_.stats().stages[list->block.stage].steals;
     unpack(list, work);
@@ -201,16 +213,34 @@ bool Worker::take_open(Work& work) {
 
 bool Worker::take_open_that_leaves_freely(Work& work) {
   while (runner_.open().take_best(work.block)) {
-    if (leaves_freely(work.block, work.cause)) {
+    // What runs at once needs no place to wait.
+    if (!layout_.stages[work.block.stage].gated || leaves_freely(work.block, work.cause)) {
       return true;
     }
   }
   return false;
 }
 
-// False if the exchange has kept the block.
-bool Worker::leaves_freely(const Block& block, FlushCause cause) {
-  return !layout_.stages[block.stage].gated || exchange_->admit(block, cause);
+// False if the block has gone to the file or to the exchange.
+bool Worker::leaves_freely(Block& block, FlushCause cause) {
+  return runner_.keep(block, cause) &&
+         (!layout_.stages[block.stage].gated || exchange_->admit(block, cause));
+}
+
+bool Worker::take_spilled(Work& work) {
+  work.is_source = false;
+  work.stolen = false;
+  while (core_.spill->read_back(runner_.cache(), work.block, work.cause)) {
+    if (!layout_.stages[work.block.stage].gated || exchange_->admit(work.block, work.cause)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// What waits outside of the workers: landed or spilled.
+bool Worker::take_from_outside(Work& work) {
+  return (exchange_ != nullptr && take_landed(work)) || (core_.spill && take_spilled(work));
 }
 
 bool Worker::take_landed(Work& work) {
@@ -264,6 +294,31 @@ void Worker::do_chores() {
   if (layout_.blocking_threads != 0) {
     feed_blocking_stages();
   }
+  if (runner_.trace() != nullptr && runner_.now() >= next_sample_) {
+    sample_queues();
+  }
+}
+
+// The counters of a trace.
+void Worker::sample_queues() {
+  const std::uint64_t now = runner_.now();
+  next_sample_ = now + (core_.clock.is_virtual() ? kSampleNanoseconds : kSampleTicks);
+  const std::int64_t lent = core_.credits.limit() - core_.credits.available();
+  runner_.record({.begin = now,
+                  .end = static_cast<std::uint64_t>(std::max<std::int64_t>(0, lent)),
+                  .kind = TraceEvent::Kind::in_flight});
+  runner_.record({.begin = now,
+                  .bin = runner_.open().count(),
+                  .items = ready_.size(),
+                  .kind = TraceEvent::Kind::queues});
+  for (std::uint32_t stage = 0; stage < layout_.stages.size(); ++stage) {
+    if (layout_.stages[stage].gated) {
+      runner_.record({.begin = now,
+                      .end = exchange_->waiting(stage),
+                      .node = stage,
+                      .kind = TraceEvent::Kind::waiting});
+    }
+  }
 }
 
 // Threads that block have nothing else to do than what they are given: they need not wait until
@@ -302,7 +357,7 @@ void Worker::share() {
       publish(block, FlushCause::asked);
       ++shared_;
     }
-  } else if (ready_.size() != 0 || core_.source_ready()) {
+  } else if (ready_.size() != 0 || core_.wants_a_worker()) {
     core_.invite();
   }
 }
@@ -311,8 +366,13 @@ void Worker::publish(const Block& block, FlushCause cause) {
   // Before others can retire these items: what they give back must have been taken, or a source
   // would find credits that nobody has given back yet.
   runner_.credits().settle(runner_.open().take_spent(), 0);
-  if (plain_ || leaves_freely(block, cause)) {
+  if (plain_) {
     push_ready(block, cause);
+    return;
+  }
+  Block leaving = block;
+  if (leaves_freely(leaving, cause)) {
+    push_ready(leaving, cause);
   }
 }
 
@@ -369,16 +429,14 @@ bool Worker::search() {
 
 bool Worker::begin_search() {
   runner_.credits().return_all();  // before looking at the sources: see Gate
-  if (exchange_ != nullptr) {
-    exchange_->take_errand();  // which is to look at the sources
-  }
+  const bool errand = exchange_ != nullptr && exchange_->take_errand();
   if (!searching_) {
     searching_ = true;
     runner_.stats().doing.set(kSearching);
     search_began_ = core_.clock.ticks();
     gate_.begin_search();
   }
-  return core_.source_ready();
+  return errand || core_.source_ready();
 }
 
 bool Worker::search_goes_on() const {
@@ -389,17 +447,22 @@ bool Worker::search_goes_on() const {
 }
 
 bool Worker::sees_work() const {
-  return gate_.any_ready() || core_.source_ready();
+  return gate_.any_ready() || core_.wants_a_worker();
 }
 
 void Worker::found_work() {
   searching_ = false;
-  runner_.stats().search_ticks += core_.clock.ticks() - search_began_;
+  end_search(core_.clock.ticks());
   // Others kept quiet while somebody was searching. If that was the last searcher and there is
   // more, call the next.
   if (gate_.hungry(gate_.end_search()) && gate_.any_ready()) {
     core_.invite();
   }
+}
+
+void Worker::end_search(std::uint64_t ticks) {
+  runner_.stats().search_ticks += ticks - search_began_;
+  runner_.record({.begin = search_began_, .end = ticks, .kind = TraceEvent::Kind::search});
 }
 
 std::uint64_t Worker::drop_all() {

@@ -56,9 +56,11 @@ class Worker final : private BlockSink {
   bool take_source(Work& work, bool last_resort);
   bool steal(Work& work);
   bool take_open(Work& work);
+  bool take_from_outside(Work& work);
   bool take_landed(Work& work);
+  bool take_spilled(Work& work);
   bool take_open_that_leaves_freely(Work& work);
-  bool leaves_freely(const Block& block, FlushCause cause);
+  bool leaves_freely(Block& block, FlushCause cause);
   void unpack(ReadyBlock* ready, Work& work);
 
   void pass_token_on(std::uint32_t stage);
@@ -66,10 +68,12 @@ class Worker final : private BlockSink {
   void do_chores();
   void flush_lingering();
   void feed_blocking_stages();
+  void sample_queues();
   void share();
 
   bool search();
   void found_work();
+  void end_search(std::uint64_t ticks);
 
   void publish(const Block& block, FlushCause cause) override;
   void push_ready(const Block& block, FlushCause cause);
@@ -96,6 +100,8 @@ class Worker final : private BlockSink {
   const std::uint64_t linger_ticks_;
   std::uint64_t search_began_ = 0;
   std::uint64_t came_ = 0;
+  std::uint64_t left_ = 0;         // when the seat was last left
+  std::uint64_t next_sample_ = 0;  // of the counters of a trace
 };
 
 }  // namespace carpool

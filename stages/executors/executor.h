@@ -35,8 +35,9 @@ struct ExecutorOptions {
   uint64_t memory_bytes = uint64_t{64} << 20;  // for path state and queues (wavefront)
   uint32_t batch_items = 0;                    // 0: each stage's own
   Policy policy = Policy::deepest_first();
-  bool bins = true;  // wavefront: false puts all materials and depths in one queue ...
-  bool simd = true;  // ... and shades one lane at a time
+  bool bins = true;              // wavefront: false puts all materials and depths in one queue ...
+  bool simd = true;              // ... and shades one lane at a time
+  Trace trace = Trace(nullptr);  // records the passes (wavefront)
 };
 
 /// What one pass did.

@@ -267,6 +267,7 @@ PassReport Wavefront::Render(const CameraPass& pass, const std::atomic<bool>& st
   run_options.arena = options_.arena;
   run_options.in_flight = in_flight_;
   run_options.policy = options_.policy;
+  run_options.trace = options_.trace;
   if (progress) run_options.progress = [&](const Progress&) { progress(work.Fraction()); };
   PassReport report;
   report.schedule = run(graph_, run_options);

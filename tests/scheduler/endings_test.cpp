@@ -208,6 +208,18 @@ TEST_P(EndingsTest, MoreThanTheDeclaredFanOutGrowsOnRequest) {
   EXPECT_FALSE(report.notes.empty());
 }
 
+TEST_P(EndingsTest, MoreThanTheDeclaredFanOutGoesToAFileOnRequest) {
+  Flood flood;
+  carpool::RunOptions spilling = options();
+  spilling.overflow = carpool::Overflow::spill;
+  const auto report = carpool::run(flood.graph, spilling);
+  EXPECT_EQ(report.stages[0].items, Flood::kItems + 1U);
+  EXPECT_EQ(report.overflow_blocks, 0U);
+  EXPECT_GT(report.spilled_blocks, 0U);
+  EXPECT_GT(report.peak_spill_bytes, Flood::kItems / 2 * sizeof(std::uint64_t));
+  EXPECT_LE(report.peak_bytes, report.worst_case_bytes);
+}
+
 TEST_P(EndingsTest, ASourceThatExceedsItsBudgetIsRefused) {
   carpool::Graph graph;
   const auto stage = graph.add_stage<int>({.name = "s"});

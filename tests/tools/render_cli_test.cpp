@@ -53,12 +53,15 @@ TEST_F(RenderCliTest, QuietSaysNothing) {
 }
 
 TEST_F(RenderCliTest, WritesWhatIsAskedFor) {
-  const std::string stats = folder_ / "stats.json", preview = folder_ / "preview.png";
-  const Outcome outcome = Carpool(Render(
-      {"--samples", "4", "--no-png", "--aov", "all", "--stats", stats, "--preview", preview}));
+  const std::string stats = folder_ / "stats.json", preview = folder_ / "preview.png",
+                    trace = folder_ / "trace.json";
+  const Outcome outcome =
+      Carpool(Render({"--samples", "4", "--no-png", "--aov", "all", "--stats", stats, "--preview",
+                      preview, "--trace", trace}));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(folder_.Files(), (Names{"out.exr", "preview.png", "stats.json", "triangle.gltf"}));
+  EXPECT_EQ(folder_.Files(), (Names{"out.exr", "preview.png", "stats.json", "trace.json", "triangle.gltf"}));
   EXPECT_EQ(ReadFile(stats).front(), '{');
+  EXPECT_NE(ReadFile(trace).find(R"("ph":"X","name":"shade","cat":"batch")"), std::string::npos);
   EXPECT_EQ(ReadFile(preview).substr(0, 4), kPngMagic);
 }
 

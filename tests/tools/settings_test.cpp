@@ -57,6 +57,7 @@ TEST(Settings, EachValueOutOfRangeIsRefusedByItsFlag) {
       {"--output", [](auto& s) { s.output_path = "a.png"; }},
       {"--output", [](auto& s) { s.output_path = ".exr"; }},
       {"--preview", [](auto& s) { s.preview_path = "a.jpg"; }},
+      {"--trace", [](auto& s) { s.trace_path = "t.json", s.executor = Executor::megakernel; }},
       {"no scene", [](auto& s) { s.scene_path = ""; }},
   };
   for (const auto& [flag, change] : cases) {

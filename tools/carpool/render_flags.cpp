@@ -116,6 +116,10 @@ void AddRunFlags(CLI::App& command, RenderFlags& flags) {
   command.add_option("--seed", s.seed, "another seed, another noise (default: 0)")->type_name("N");
   AddMachineFlags(command, flags);
   command.add_option("--stats", s.stats_path, "the run's report as JSON")->type_name("FILE.json");
+  command
+      .add_option("--trace", s.trace_path,
+                  "when each worker did what; open it in ui.perfetto.dev or chrome://tracing")
+      ->type_name("FILE.json");
   command.add_flag("--quiet", s.quiet, "say nothing but errors");
 }
 

@@ -59,7 +59,7 @@ RandomGraph::RandomGraph(const Shape& shape)
   for (std::uint32_t i = 0; i < shape.sources; ++i) {
     const auto source =
         graph_.add_source({.name = std::string("source").append(std::to_string(i)),
-                           .fan_out = shape.fan_out,
+                           .fan_out = shape.undeclared ? 1 : shape.fan_out,
                            .concurrency = shape.source_concurrency,
                            .burst = 256},
                           [this, i](carpool::SourceContext& ctx, carpool::Emitter& out) {

@@ -38,6 +38,7 @@ struct Shape {
   bool explicit_weights = false;  // the last stage never splits, and says so
   bool caps = false;              // some stages allow few calls at once
   bool blocking = false;          // some stages block, on one to three threads of their own
+  bool undeclared = false;        // sources declare no fan-out, whatever it is
 };
 
 // Tally is what is compared: how many visits, and a sum over all of them that depends on every

@@ -78,6 +78,11 @@ void exaggerate(Scenario& scenario, Dice& dice) {
     shape.most_hops = 400;
   }
   options.in_flight = std::max<std::uint64_t>(options.in_flight, shape.fan_out);
+  if (dice.one_in(10)) {  // nobody has said how many items there will be
+    shape.undeclared = true;
+    options.overflow = carpool::Overflow::spill;
+    options.in_flight = 2 + dice.roll(60);
+  }
 }
 
 }  // namespace

@@ -10,4 +10,5 @@
 #include "carpool/policy.h"
 #include "carpool/report.h"
 #include "carpool/run.h"
+#include "carpool/trace.h"
 #include "carpool/version.h"

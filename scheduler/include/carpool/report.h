@@ -88,8 +88,10 @@ struct RunReport {
   std::uint64_t peak_in_flight =
       0;  ///< Most credits lent at once, those in workers' caches counted in.
   std::uint64_t in_flight_limit = 0;
-  std::uint64_t overflow_blocks = 0;  ///< Blocks beyond the bound (Overflow::grow only).
-  std::uint64_t dropped_items = 0;    ///< Live items when the run was ended early.
+  std::uint64_t overflow_blocks = 0;   ///< Blocks beyond the bound (Overflow::grow only).
+  std::uint64_t spilled_blocks = 0;    ///< Blocks written to the file (Overflow::spill only).
+  std::uint64_t peak_spill_bytes = 0;  ///< The file's greatest length.
+  std::uint64_t dropped_items = 0;     ///< Live items when the run was ended early.
   std::vector<std::string> notes =
       {};  ///< Advice: keys that were too many for the items, and the like.
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 
@@ -14,6 +15,7 @@
 #include "carpool/monitor.h"
 #include "carpool/policy.h"
 #include "carpool/report.h"
+#include "carpool/trace.h"
 
 namespace carpool {
 
@@ -52,6 +54,12 @@ struct Simulation {
 enum class Overflow {
   fail,  ///< The emit throws OverflowError, which ends the run.
   grow,  ///< The run takes more memory than worst_case_bytes() and says so in its report.
+
+  /// Full blocks that would exceed worst_case_bytes() are written to a file, and read back when
+  /// there is room. The file has no name and is gone with the run. What fails to be written or read
+  /// ends the run with std::system_error. A block costs a copy to or from the system's cache of the
+  /// file, and a disk's time if that does not suffice.
+  spill,
 };
 
 /// FlushOptions says when a block leaves before it is full.
@@ -86,6 +94,7 @@ struct RunOptions {
   RunMode mode = RunMode::threads;
   Simulation simulation = {};  ///< For RunMode::simulated.
   Overflow overflow = Overflow::fail;
+  std::filesystem::path spill_folder = {};  ///< For Overflow::spill. Empty: the system's own.
 
   /// Ends the run early on request. The default token never asks.
   CancelToken cancel = CancelToken(nullptr);
@@ -95,6 +104,9 @@ struct RunOptions {
 
   /// Lets other threads look at the run. The default shows nothing.
   Monitor monitor = Monitor(nullptr);
+
+  /// Records the run for a trace viewer. The default records nothing.
+  Trace trace = Trace(nullptr);
 
   /// Called by one worker at a time, between batches, about every `progress_every`. Keep it short.
   /// Exceptions end the run.
