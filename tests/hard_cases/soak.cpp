@@ -23,7 +23,10 @@ void MoveAtRandom(SceneCase& scene, std::mt19937& rng) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> decade(0, 6);
   double q[4], length = 0;
-  for (double& x : q) length += (x = normal(rng)) * x;
+  for (double& x : q) {
+    x = normal(rng);
+    length += x * x;
+  }
   const double far = std::pow(10.0, decade(rng)) - 1;  // up to 1e6 m from the origin
   nlohmann::json& roots = scene.scene.json()["scenes"][0]["nodes"];
   const nlohmann::json children = roots;
