@@ -51,6 +51,11 @@ TEST_F(CliTest, WrongCommandLinesAreRefused) {
       {{"render", scene_, "-o", image, "--executor", "gpu"}, "--executor"},
       {{"render", scene_, "-o", image, "--policy", "best"}, "--policy"},
       {{"render", scene_, "-o", image, "--isa", "mmx"}, "--isa"},
+      {{"render", scene_, "-o", image, "--direct", "luck"}, "--direct"},
+      {{"render", scene_, "-o", image, "--clamp", "-1"}, "--clamp"},
+      {{"render", scene_, "-o", image, "--pixel", "1,1"}, "--explain"},
+      {{"render", scene_, "--pixel", "1", "--explain"}, "--pixel"},
+      {{"render", scene_, "--size", "4x4", "--pixel", "4,0", "--explain"}, "--pixel"},
       {{"plan", scene_, "--depth", "-1"}, "--depth"},
   };
   for (const auto& [arguments, text] : cases) {

@@ -148,7 +148,7 @@ RenderSettings Settle(const RenderFlags& flags) {
   s.write_png = !flags.no_png;
   s.robust = !flags.no_robust;
   if (s.output_path.empty() && !flags.explain && flags.needs_output)
-    throw render::Error(render::ExitCode::usage, "no image given; add -o FILE.exr");
+    throw render::Error(render::ExitCode::usage, "--output: no image given; add -o FILE.exr");
   if (!flags.pixel.empty() && !flags.explain) {
     throw render::Error(render::ExitCode::usage, "--pixel names a path to explain; add --explain");
   }
