@@ -13,6 +13,7 @@
 #include "stages/executors/camera_group.h"
 #include "stages/executors/ladder.h"
 #include "stages/simd/denormals.h"
+#include "stages/tables/huge_pages.h"
 
 namespace carpool::stages {
 namespace {
@@ -72,7 +73,7 @@ class Barriers final : public Executor {
   int lanes_;
   OpacityQuery opacity_;
   ExecutorOptions options_;
-  std::vector<PathState> paths_;
+  HugeVector<PathState> paths_;
   std::vector<Step> step_;  // of each slot, written by the step before
   std::array<std::vector<uint32_t>, kSteps> lists_;
 

@@ -8,6 +8,7 @@
 #include "stages/executors/executor.h"
 #include "stages/executors/slot_pool.h"
 #include "stages/simd/denormals.h"
+#include "stages/tables/huge_pages.h"
 
 namespace carpool::stages {
 namespace {
@@ -99,7 +100,7 @@ class Wavefront final : public Executor {
   uint32_t in_flight_;
   ShadeBins bins_;
   SlotPool pool_;
-  std::vector<PathState> paths_;
+  HugeVector<PathState> paths_;
   std::vector<WorkerTally> tallies_;
   bool has_environment_ = false, has_shadow_ = false;
 

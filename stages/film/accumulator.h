@@ -8,6 +8,8 @@
 #include <mutex>
 #include <vector>
 
+#include "stages/tables/huge_pages.h"
+
 namespace carpool::stages {
 
 constexpr int kScrambles = 4;             // samples belong by index to four independent scrambles
@@ -122,7 +124,7 @@ class FilmAccumulator {
   std::array<Fault, kSampleFaults> faults_;
   std::mutex clamp_mutex_;
   __int128 removed_[3] = {0, 0, 0};  // by the clamp, in quanta
-  std::vector<FilmPixel> pixels_;
+  HugeVector<FilmPixel> pixels_;
   std::vector<int64_t> albedo_, normal_;  // 3 per pixel, quantum 2^-32
   std::vector<float> depth_;
   std::vector<uint32_t> object_, material_;

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "stages/tables/huge_pages.h"
+
 #include "stages/tables/geometry.h"
 
 namespace carpool::stages {
@@ -93,7 +95,7 @@ struct alignas(128) Texture {
 static_assert(sizeof(Texture) == 128);
 
 struct TextureTables {
-  std::vector<uint32_t> words;  // all texels of all textures, at most 2^31 - 1 words (8 GiB)
+  HugeVector<uint32_t> words;  // all texels of all textures, at most 2^31 - 1 words (8 GiB)
   std::vector<Texture> textures;
   std::vector<TextureSlot> slots;
 };
