@@ -11,6 +11,9 @@ namespace carpool::stages {
 constexpr uint32_t kGroupWidth = 4, kGroupHeight = 2;  // pixels of one coherent packet
 constexpr uint32_t kTileSize = 16;                     // pixels along a tile's side
 constexpr uint32_t kGroupsPerTile = kTileSize * kTileSize / 8;
+constexpr uint32_t kClaim =
+    4 * kGroupsPerTile;           // packets that a worker claims at once: four samples
+                                  // of a tile, whose pixels stay in one cache
 constexpr uint32_t kPhases = 32;  // interleaved subsets of groups, for previews
 constexpr uint32_t kAllPhases = ~0u;
 

@@ -71,7 +71,7 @@ PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& s
     RayCounts& rays = tallies.local();
     bool more = true;
     while (more && !stop.load(std::memory_order_relaxed)) {
-      more = work.Claim(kGroupsPerTile, [&](const CameraPacket& p) { RenderPacket(p, rays); });
+      more = work.Claim(kClaim, [&](const CameraPacket& p) { RenderPacket(p, rays); });
       if (progress && !reporting.exchange(true, std::memory_order_acquire)) {
         progress(work.Fraction());
         reporting.store(false, std::memory_order_release);

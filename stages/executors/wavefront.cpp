@@ -136,7 +136,7 @@ void Wavefront::BuildGraph() {
   if (has_environment_) miss_ = stage("environment", 1, lanes, 4);
 
   const SourceHandle pixels = graph_.add_source(
-      {.name = "pixels", .fan_out = 8, .concurrency = 0, .burst = 32},
+      {.name = "pixels", .fan_out = 8, .concurrency = 0, .burst = kClaim},
       [this](SourceContext& source, Emitter& out) { return ClaimPackets(source, out); });
   graph_.set_kernel(camera_,
                     [this](const Batch<CameraPacket>& b, Emitter& out) { CameraKernel(b, out); });

@@ -70,14 +70,12 @@ HWY_INLINE void CameraLanes(D d, const KernelContext& c, const PathLanes<D>& p) 
 
   const LaneList<D> list = ListLanes(d, p, p.active);
   const Real<D> zero = hn::Zero(d);
-  StoreVec3(d, list, offsetof(PathState, origin), origin);
-  StoreWord(d, list, offsetof(PathState, tnear), zero);
-  StoreVec3(d, list, offsetof(PathState, direction), direction);
-  StoreWord(d, list, offsetof(PathState, pdf), zero);
-  StoreVec3(d, list, offsetof(PathState, throughput), Splat3(d, 1, 1, 1));
-  StoreWord(d, list, offsetof(PathState, cone_width), width);
-  StoreVec3(d, list, offsetof(PathState, radiance), Splat3(d, 0, 0, 0));
-  StoreWord(d, list, offsetof(PathState, cone_spread), spread);
+  const Real<D> one = Splat(d, 1);
+  StoreQuad(d, list, offsetof(PathState, origin), origin.x, origin.y, origin.z, zero);  // tnear
+  StoreQuad(d, list, offsetof(PathState, direction), direction.x, direction.y, direction.z,
+            zero);  // pdf
+  StoreQuad(d, list, offsetof(PathState, throughput), one, one, one, width);
+  StoreQuad(d, list, offsetof(PathState, radiance), zero, zero, zero, spread);
   StoreWord(d, list, offsetof(PathState, flags), zero);
   StoreWord(d, list, offsetof(PathState, shadow_distance), zero);
 }
