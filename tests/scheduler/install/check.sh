@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Installs the scheduler, which is built alone, and uses it from outside: check.sh CMAKE CXX PKG_CONFIG SCHEDULER VERSION.
+# Installs the scheduler, which is built alone, and uses it from outside: check.sh CMAKE CXX PKG_CONFIG SCHEDULER VERSION
+# GENERATOR.
 set -euo pipefail
 readonly cmake=$1 cxx=$2 pkg_config=$3 scheduler=$4 version=$5
+export CMAKE_GENERATOR=$6  # the one that is here: a fresh machine may have no other
 outsider=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 readonly outsider
 
