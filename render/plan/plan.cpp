@@ -147,16 +147,17 @@ void PlanBvh(Plan& plan, const PreparedScene& scene, const std::vector<Material>
       settings.robust ? "no ray slips between triangles" : "--no-robust");
 }
 
-// Measured on this project's scenes: the wavefront wins wherever shading costs, and loses nowhere
-// by much.
 void PlanExecutor(Plan& plan, const RenderSettings& settings) {
   if (settings.executor != Executor::automatic) {
     plan.executor = settings.executor;
     plan.executor_reason = "asked for";
     return;
   }
-  plan.executor = Executor::wavefront;
-  plan.executor_reason = "the default";
+  const bool traced = !settings.trace_path.empty();
+  plan.executor = traced ? Executor::wavefront : Executor::automatic;
+  plan.executor_reason = traced
+                             ? "--trace shows its stages"
+                             : "wavefront or megakernel, whichever the first samples show faster";
 }
 
 }  // namespace

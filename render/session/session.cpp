@@ -209,8 +209,10 @@ RenderSummary Render(const RenderSettings& settings, const std::atomic<bool>& st
     phase(ProgressPhase::bvh);
     Workspace workspace(std::move(scene), settings, threads);
     Describe(workspace, settings, summary);
-    summary.executor = workspace.executor().name();
     PassLoop(workspace, settings, stop, progress, begin, summary).Run();
+    summary.executor = workspace.executor().name();
+    if (const std::string why = workspace.executor().Why(); !why.empty())
+      summary.executor_reason = why;
     phase(ProgressPhase::save);
     Save(workspace, settings, summary);
   });

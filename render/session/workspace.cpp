@@ -128,10 +128,20 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
   context_.film = &film_;
   stages::ExecutorOptions options = ExecutorOptionsFor(settings, threads);
   options.trace = trace_;
-  executor_ =
-      plan_.executor == Executor::megakernel
-          ? stages::MakeMegakernel(context_, kernels_, options)
-          : stages::MakeWavefront(context_, kernels_, scene_.tables.geometry.placements, options);
+  executor_ = MakeExecutor(options);
+}
+
+std::unique_ptr<stages::Executor> Workspace::MakeExecutor(
+    const stages::ExecutorOptions& options) const {
+  std::vector<std::unique_ptr<stages::Executor>> candidates;
+  if (plan_.executor != Executor::megakernel) {
+    candidates.push_back(
+        stages::MakeWavefront(context_, kernels_, scene_.tables.geometry.placements, options));
+  }
+  if (plan_.executor != Executor::wavefront)
+    candidates.push_back(stages::MakeMegakernel(context_, kernels_, options));
+  if (candidates.size() == 1) return std::move(candidates.front());
+  return stages::MakeFastest(std::move(candidates), uint64_t{context_.width} * context_.height);
 }
 
 }  // namespace carpool::render

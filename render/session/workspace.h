@@ -60,6 +60,8 @@ class Workspace {
   const Trace& trace() const { return trace_; }
 
  private:
+  std::unique_ptr<stages::Executor> MakeExecutor(const stages::ExecutorOptions& options) const;
+
   PreparedScene scene_;
   Plan plan_;
   const stages::Kernels& kernels_;

@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <tbb/task_arena.h>
 
@@ -62,6 +63,9 @@ class Executor {
   /// The stage graph in Graphviz's language; empty for executors without one.
   virtual std::string Dot() const = 0;
 
+  /// Why this one drives the kernels, where that was for it to decide; else empty.
+  virtual std::string Why() const { return {}; }
+
   /// Renders one pass. `stop` ends it early: no new camera rays, what is in flight comes to its
   /// end. `progress`, if set, is called now and then by some worker with the fraction done.
   virtual PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
@@ -74,5 +78,11 @@ std::unique_ptr<Executor> MakeWavefront(const KernelContext& context, const Kern
                                         const ExecutorOptions& options);
 std::unique_ptr<Executor> MakeMegakernel(const KernelContext& context, const Kernels& kernels,
                                          const ExecutorOptions& options);
+
+/// Renders by whichever candidate is fastest for this scene: the first passes are shared out among
+/// them in parts, which are timed; all that follows goes to the winner. What is too short to be
+/// timed goes to candidates[0]. `pixels` is how many the image has.
+std::unique_ptr<Executor> MakeFastest(std::vector<std::unique_ptr<Executor>> candidates,
+                                      uint64_t pixels);
 
 }  // namespace carpool::stages

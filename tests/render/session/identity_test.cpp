@@ -103,6 +103,21 @@ TEST_F(Identity, HoldsForThreadsBatchesPoliciesAndExecutors) {
   }
 }
 
+TEST_F(Identity, HoldsWhileTheFastestExecutorIsFound) {
+  RenderSettings wave = Base();
+  wave.width = 256;  // enough paths for parts of a pass to be timed
+  wave.height = 256;
+  wave.samples = 40;
+  wave.max_depth = 2;
+  wave.threads = 2;
+  wave.executor = Executor::wavefront;
+  RenderSettings automatic = wave;
+  automatic.executor = Executor::automatic;
+  const Rendered found = RenderOnce(automatic);
+  EXPECT_TRUE(PixelBytes(found.image) == PixelBytes(RenderOnce(wave).image));
+  EXPECT_EQ(found.summary.executor_reason.substr(0, 13), "measured here");
+}
+
 TEST_F(Identity, AnotherSeedIsAnotherImage) {
   RenderSettings other = Base();
   other.seed = 1;
