@@ -1,0 +1,196 @@
+// Measures one scene: each round runs everything once, in turn, so that all see the same machine.
+#include "tools/bench/scene_bench.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/session/workspace.h"
+#include "tools/bench/replay.h"
+
+namespace carpool::tools {
+namespace {
+
+using render::Executor;
+
+double Median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+render::RenderSettings SettingsFor(const SceneCase& scene, const BenchOptions& o) {
+  render::RenderSettings s;
+  s.scene_path = scene.path;
+  s.env_path = scene.environment;
+  s.camera = scene.camera;
+  s.width = o.width;
+  s.height = o.height;
+  s.samples = o.samples;
+  s.threads = o.threads;
+  s.isa = render::ParseIsa(o.isa);
+  s.executor = Executor::wavefront;
+  return s;
+}
+
+/// A part of the workers' time, which is spent in kernels, sources, deciding and waiting.
+double ShareOf(const RunReport& r, double seconds) {
+  const double all = r.kernel_seconds + r.source_seconds + r.scheduler_seconds + r.idle_seconds;
+  return all > 0 ? seconds / all : 0;
+}
+
+/// Seconds and rays of one executor over the rounds.
+struct Track {
+  stages::Executor& executor;
+  std::vector<double> seconds = {}, mega_rays = {};
+  stages::PassReport last = {};
+
+  void Run(const stages::CameraPass& pass, bool counts) {
+    const std::atomic<bool> never{false};
+    last = executor.Render(pass, never, {});
+    if (!counts) return;
+    seconds.push_back(last.seconds);
+    mega_rays.push_back(static_cast<double>(last.rays.total()) / last.seconds / 1e6);
+  }
+};
+
+void MeasureRounds(const BenchOptions& o, render::Workspace& w, render::Workspace& loose,
+                   const stages::ExecutorOptions& options, SceneFigures& f) {
+  const auto megakernel = stages::MakeMegakernel(w.context(), w.kernels(), options);
+  Track wave{w.executor()}, mega{*megakernel}, fast{loose.executor()};
+  const stages::CameraPass pass{.sample_count = static_cast<uint32_t>(o.samples)};
+  const RayLog log = RecordRays(w.context(), w.kernels(), pass.sample_count);
+  std::vector<double> plain, sorted, over_mega, price, share, idle;
+  const auto speed = [&](double seconds) {
+    return static_cast<double>(log.total()) / seconds / 1e6;
+  };
+  for (int round = 0; round < o.rounds + 1; ++round) {
+    for (Track* track : {&mega, &wave, &fast}) track->Run(pass, round > 0);
+    const double in_order = Replay(w.context().trace, log, false, *options.arena);
+    const double in_windows = Replay(w.context().trace, log, true, *options.arena);
+    if (round == 0) continue;
+    plain.push_back(speed(in_order));
+    sorted.push_back(speed(in_windows));
+    over_mega.push_back(mega.last.seconds / wave.last.seconds);
+    price.push_back(wave.last.seconds / fast.last.seconds);
+    const RunReport& r = wave.last.schedule;
+    share.push_back(ShareOf(r, r.scheduler_seconds));
+    idle.push_back(ShareOf(r, r.idle_seconds));
+  }
+  f.wave = Median(wave.mega_rays);
+  f.mega = Median(mega.mega_rays);
+  f.embree_plain = Median(plain);
+  f.embree_sorted = Median(sorted);
+  f.over_mega = Median(over_mega);
+  f.least_over_mega = *std::min_element(over_mega.begin(), over_mega.end());
+  f.most_over_mega = *std::max_element(over_mega.begin(), over_mega.end());
+  f.robust_price = Median(price);
+  f.scheduler_share = Median(share);
+  f.idle_share = Median(idle);
+  f.schedule = wave.last.schedule;
+  f.mebibytes = static_cast<double>(wave.last.state_bytes + f.schedule.peak_bytes) / (1 << 20);
+}
+
+/// Speed of the wavefront on 1, 2, 4 ... threads over one, all in turn.
+void MeasureScaling(const render::RenderSettings& settings, const BenchOptions& o,
+                    render::Workspace& w, int most, SceneFigures& f) {
+  std::vector<int> counts;
+  for (int n = 1; n < most; n *= 2) counts.push_back(n);
+  counts.push_back(most);
+  const stages::CameraPass pass{.sample_count = static_cast<uint32_t>(o.samples)};
+  std::vector<std::vector<double>> seconds(counts.size());
+  for (int round = 0; round < o.rounds; ++round) {
+    for (size_t i = 0; i < counts.size(); ++i) {
+      render::Threads threads(counts[i]);
+      const auto wavefront =
+          stages::MakeWavefront(w.context(), w.kernels(), w.scene().tables.geometry.placements,
+                                render::ExecutorOptionsFor(settings, threads));
+      Track track{*wavefront};
+      track.Run(pass, true);
+      seconds[i].push_back(track.last.seconds);
+    }
+  }
+  for (size_t i = 0; i < counts.size(); ++i)
+    f.scaling.emplace_back(counts[i], Median(seconds[0]) / Median(seconds[i]));
+}
+
+render::LadderReport Climb(render::RenderSettings settings) {
+  settings.width = settings.height = 256;
+  settings.samples = 16;
+  const std::atomic<bool> never{false};
+  return render::RunLadder(settings, {.rounds = 3, .serial_seconds = 30}, never, {}, {});
+}
+
+}  // namespace
+
+SceneFigures BenchScene(const SceneCase& scene, const BenchOptions& options) {
+  SceneFigures f;
+  f.scene = scene;
+  const render::RenderSettings settings = SettingsFor(scene, options);
+  {
+    render::Threads threads(options.threads);
+    f.threads = threads.count();
+    threads.arena().execute([&] {
+      render::RenderSettings loose_settings = settings;
+      loose_settings.robust = false;
+      render::Workspace w(render::LoadScene(settings, {}), settings, threads);
+      render::Workspace loose(render::LoadScene(loose_settings, {}), loose_settings, threads);
+      const render::LoadTimes& times = w.scene().times;
+      f.load_seconds = times.import + times.textures + times.geometry + times.lights;
+      f.bvh_seconds = w.bvh().seconds();
+      f.bvh_mebibytes = static_cast<double>(w.bvh().bytes()) / (1 << 20);
+      f.film_mebibytes = static_cast<double>(w.film().bytes()) / (1 << 20);
+      f.isa = w.kernels().isa;
+      MeasureRounds(options, w, loose, render::ExecutorOptionsFor(settings, threads), f);
+      if (options.scaling) MeasureScaling(settings, options, w, f.threads, f);
+    });
+  }
+  if (options.ladder) f.ladder = Climb(settings);
+  return f;
+}
+
+std::vector<Row> RowsOf(const SceneFigures& f) {
+  std::vector<Row> rows;
+  const auto add = [&](const char* name, double value, const char* unit, const char* target = "",
+                       bool holds = true) {
+    rows.push_back({f.scene.label + ": " + name, value, unit, target, holds});
+  };
+  add("wavefront over megakernel", f.over_mega, "x", ">= 1", f.over_mega >= 1);
+  add("wavefront", f.wave, "M rays/s");
+  add("megakernel", f.mega, "M rays/s");
+  add("bare Embree, rays as they came", f.embree_plain, "M rays/s");
+  add("bare Embree, rays sorted", f.embree_sorted, "M rays/s");
+  add("wavefront over bare Embree", f.WaveOverEmbree(), "x", ">= 0.5", f.WaveOverEmbree() >= 0.5);
+  add("megakernel over bare Embree", f.MegaOverEmbree(), "x");
+  add("time with ROBUST over without", f.robust_price, "x");
+  add("scheduler's share of worker time", 100 * f.scheduler_share, "%", "<= 1",
+      f.scheduler_share <= 0.01);
+  add("bubbles", 100 * f.idle_share, "%");
+  add("path state and queues", f.mebibytes, "MiB", "<= 64", f.mebibytes <= 64);
+  add("load", f.load_seconds, "s");
+  add("BVH", f.bvh_seconds, "s");
+  for (const auto& [threads, speed] : f.scaling) {
+    if (threads == 1) continue;
+    const bool two = threads == 2;
+    add((std::to_string(threads) + " threads over one").c_str(), speed, "x", two ? ">= 1.9" : "",
+        !two || speed >= 1.9);
+  }
+  return rows;
+}
+
+std::vector<Row> SummaryRows(const std::vector<SceneFigures>& scenes) {
+  if (scenes.size() < 2) return {};
+  const auto mean = [&](auto figure) {
+    double sum = 0;
+    for (const SceneFigures& f : scenes) sum += std::log(figure(f));
+    return std::exp(sum / static_cast<double>(scenes.size()));
+  };
+  const double over_mega = mean([](const SceneFigures& f) { return f.over_mega; });
+  const double of_embree = mean([](const SceneFigures& f) { return f.WaveOverEmbree(); });
+  const double mega_of_embree = mean([](const SceneFigures& f) { return f.MegaOverEmbree(); });
+  const std::string all = "geometric mean of " + std::to_string(scenes.size()) + " scenes: ";
+  return {{all + "wavefront over megakernel", over_mega, "x", ">= 1.6", over_mega >= 1.6},
+          {all + "wavefront over bare Embree", of_embree, "x", ">= 0.7", of_embree >= 0.7},
+          {all + "megakernel over bare Embree", mega_of_embree, "x", "", true}};
+}
+
+}  // namespace carpool::tools

@@ -1,0 +1,66 @@
+// Everything that is measured of one scene: executors in turn, bare Embree, prices, threads,
+// ladder.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "carpool/report.h"
+#include "render/ladder/ladder.h"
+#include "tools/bench/rows.h"
+
+namespace carpool::tools {
+
+struct SceneCase {
+  std::string label;  // as shown
+  std::string path;   // glTF
+  std::string environment;
+  std::string camera;
+};
+
+struct BenchOptions {
+  int width = 512, height = 512, samples = 4;
+  int rounds = 5;   // counted, after one to warm up
+  int threads = 0;  // 0: all
+  std::string isa = "auto";
+  bool scaling = false;  // also fewer threads
+  bool ladder = false;   // also the ladder, 256x256
+};
+
+/// Wall-clock figures are medians over the rounds, in each of which everything runs once, in turn.
+struct SceneFigures {
+  SceneCase scene;
+  std::string isa;
+  int threads = 0;
+  uint64_t triangles = 0;                          // as drawn
+  double load_seconds = 0, bvh_seconds = 0;        // load: everything before the BVH
+  double wave = 0, mega = 0;                       // M rays/s
+  double embree_plain = 0, embree_sorted = 0;      // M rays/s of the same rays in bare Embree
+  double over_mega = 0;                            // wavefront's speed / megakernel's
+  double least_over_mega = 0, most_over_mega = 0;  // of all rounds
+  double robust_price = 0;     // seconds with Embree's ROBUST flag / without, wavefront
+  double scheduler_share = 0;  // of worker time, 0..1
+  double idle_share = 0;
+  double mebibytes = 0;  // path state and queues
+  double bvh_mebibytes = 0, film_mebibytes = 0;
+  std::vector<std::pair<int, double>> scaling;  // threads, speed over one thread
+  RunReport schedule;                           // of the wavefront's last round
+  std::optional<render::LadderReport> ladder;
+
+  double Embree() const { return std::max(embree_plain, embree_sorted); }
+  double WaveOverEmbree() const { return wave / Embree(); }
+  double MegaOverEmbree() const { return mega / Embree(); }
+};
+
+/// Throws render::Error where the scene cannot be loaded.
+SceneFigures BenchScene(const SceneCase& scene, const BenchOptions& options);
+
+/// The figures as rows, with the targets that they are held against.
+std::vector<Row> RowsOf(const SceneFigures& figures);
+
+/// Rows over all scenes: geometric means. None for a single scene.
+std::vector<Row> SummaryRows(const std::vector<SceneFigures>& scenes);
+
+}  // namespace carpool::tools
