@@ -5,6 +5,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "carpool/monitor.h"
+
 namespace carpool {
 namespace {
 
@@ -24,6 +26,14 @@ std::string quoted(const std::string& text) {
     result += c;
   }
   return result + '"';
+}
+
+std::string limits_of(const StageOptions& options) {
+  if (options.concurrency == 0) {
+    return "";
+  }
+  return "\n" + std::to_string(options.concurrency) +
+         (options.blocking ? " threads of its own" : " at once");
 }
 
 }  // namespace
@@ -109,27 +119,44 @@ void Graph::validate() const {
   }
 }
 
-std::string Graph::dot() const {
+std::string Graph::dot(const RunState* live) const {
+  std::uint64_t queued = 1;
+  for (std::size_t i = 0; live != nullptr && i < live->stages.size(); ++i) {
+    queued += live->stages[i].queued;
+  }
   std::ostringstream out;
   out << "digraph carpool {\n  rankdir=LR;\n  node [fontname=\"sans-serif\"];\n";
+  const auto node = [&](const char* kind, std::size_t index, const std::string& shape,
+                        const std::string& label, const std::vector<std::uint32_t>& successors) {
+    out << "  " << kind << index << " [" << shape << ", label=" << quoted(label) << "];\n";
+    for (const std::uint32_t to : successors) {
+      out << "  " << kind << index << " -> stage" << to << ";\n";
+    }
+  };
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const Source& source = sources_[i];
-    out << "  source" << i << " [shape=house, label="
-        << quoted(source.options.name + "\nfan-out " + std::to_string(source.options.fan_out))
-        << "];\n";
-    for (const std::uint32_t to : source.successors) {
-      out << "  source" << i << " -> stage" << to << ";\n";
+    std::string label = source.options.name + "\nfan-out " + std::to_string(source.options.fan_out);
+    if (live != nullptr) {
+      label += live->sources.at(i).exhausted
+                   ? "\nexhausted"
+                   : "\n" + std::to_string(live->sources[i].inside) + " inside";
     }
+    node("source", i, "shape=house", label, source.successors);
   }
   for (std::size_t i = 0; i < stages_.size(); ++i) {
     const Stage& stage = stages_[i];
-    out << "  stage" << i << " [shape=box, label="
-        << quoted(stage.options.name + "\n" + std::to_string(stage.options.bins) + " bins of " +
-                  std::to_string(stage.item_bytes) + " B items")
-        << "];\n";
-    for (const std::uint32_t to : stage.successors) {
-      out << "  stage" << i << " -> stage" << to << ";\n";
+    std::string shape = "shape=box";
+    std::string label = stage.options.name + "\n" + std::to_string(stage.options.bins) +
+                        " bins of " + std::to_string(stage.item_bytes) + " B items" +
+                        limits_of(stage.options);
+    if (live != nullptr) {
+      const RunState::Stage& state = live->stages.at(i);
+      label += "\n" + std::to_string(state.queued) + " queued, " + std::to_string(state.running) +
+               " running, " + std::to_string(state.items) + " done";
+      const double share = static_cast<double>(state.queued) / static_cast<double>(queued);
+      shape += ", style=filled, fillcolor=\"0.09 " + std::to_string(share) + " 1.0\"";
     }
+    node("stage", i, shape, label, stage.successors);
   }
   out << "}\n";
   return out.str();

@@ -46,6 +46,13 @@ void RunState::print(std::ostream& out) const {
   out << "run: " << active << " active, " << searching << " of them searching, " << invited
       << " invited, " << credits << " credits free" << (caller_asleep ? ", caller asleep" : "")
       << (stopped ? ", stopped" : "") << (over ? ", over" : "") << '\n';
+  for (const Stage& stage : stages) {
+    out << "  stage " << stage.name << ": " << stage.queued << " items queued, " << stage.running
+        << " calls running, " << stage.items << " items so far\n";
+  }
+  if (spilled_blocks != 0) {
+    out << "  " << spilled_blocks << " blocks in the file\n";
+  }
   for (const Source& source : sources) {
     out << "  source " << source.name << ": " << source.inside << " inside"
         << (source.exhausted ? ", exhausted" : "") << '\n';
@@ -55,6 +62,11 @@ void RunState::print(std::ostream& out) const {
     out << "  worker " << i << ": " << worker.doing << "; " << worker.ready_blocks
         << " ready blocks (" << worker.ready_partial << " partial), " << worker.open_blocks
         << " open; " << worker.batches << " batches, " << worker.items << " items so far\n";
+  }
+  for (std::size_t i = 0; i < blocking_threads.size(); ++i) {
+    const Worker& thread = blocking_threads[i];
+    out << "  blocking thread " << i << ": " << thread.doing << "; " << thread.batches
+        << " batches, " << thread.items << " items so far\n";
   }
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <unordered_map>
 
 #include <tbb/task_arena.h>
@@ -33,8 +34,18 @@ constexpr std::uint32_t kMostWorkers = 4096;
 class ArenaChoice {
  public:
   explicit ArenaChoice(const RunOptions& options) {
+    if (options.arena != nullptr && options.constraints) {
+      throw std::invalid_argument(
+          "carpool: give RunOptions either an arena or constraints for one, not both");
+    }
     if (options.arena != nullptr) {
       arena_ = options.arena;
+    } else if (options.constraints) {
+      tbb::task_arena::constraints constraints = *options.constraints;
+      if (options.threads != 0) {
+        constraints.set_max_concurrency(static_cast<int>(std::min(options.threads, kMostWorkers)));
+      }
+      arena_ = &own_.emplace(constraints);
     } else if (options.threads != 0) {
       arena_ = &own_.emplace(static_cast<int>(std::min(options.threads, kMostWorkers)));
     } else {

@@ -209,6 +209,21 @@ void RunCore::maybe_report_progress() {
                           std::memory_order_release);
 }
 
+RunState::Stage RunCore::stage_state(std::size_t index) const {
+  RunState::Stage state{.name = graph.stages()[index].options.name};
+  std::uint64_t published = 0;
+  for_each_runner([&](const BatchRunner& runner) {
+    // What is done is read first, so that the difference is never below zero by that.
+    state.items += runner.stats().stages[index].items.get();
+    state.running += runner.stats().doing.get() == kInNode + index ? 1 : 0;
+  });
+  for_each_runner([&](const BatchRunner& runner) {
+    published += runner.stats().stages[index].published.get();
+  });
+  state.queued = published > state.items ? published - state.items : 0;
+  return state;
+}
+
 RunState RunCore::state() const {
   const Gate::View view = gate->relaxed_view();
   RunState state{.active = view.active(),
@@ -226,6 +241,13 @@ RunState RunCore::state() const {
   for (const auto& worker : workers_) {
     state.workers.push_back(worker->state());
   }
+  for (const auto& worker : blocking_workers_) {
+    state.blocking_threads.push_back(worker->runner().state());
+  }
+  for (std::size_t s = 0; s < graph.stages().size(); ++s) {
+    state.stages.push_back(stage_state(s));
+  }
+  state.spilled_blocks = spill ? spill->blocks() : 0;
   return state;
 }
 

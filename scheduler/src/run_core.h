@@ -116,6 +116,7 @@ class RunCore {
     std::atomic<bool> exhausted{false};
   };
 
+  RunState::Stage stage_state(std::size_t index) const;
   template <class Visit>
   void for_each_runner(Visit visit) const;
   void stop();

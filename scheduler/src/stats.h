@@ -27,6 +27,7 @@ class Counter {
 struct StageStats {
   Counter batches;
   Counter items;
+  Counter published;        // items that have left open blocks; where a monitor watches
   std::uint64_t seats = 0;  // lanes offered
   std::uint64_t steals = 0;
   std::uint64_t kernel_ticks = 0;

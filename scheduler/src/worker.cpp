@@ -23,8 +23,8 @@ constexpr std::uint64_t kFirstSharePause = 40'000;
 constexpr std::uint64_t kLongestSharePause = 4'000'000;
 
 // How often each worker samples the counters of a trace.
-constexpr std::uint64_t kSampleTicks = 100'000;
-constexpr std::uint64_t kSampleNanoseconds = 50'000;
+constexpr std::uint64_t kSampleTicks = 400'000;
+constexpr std::uint64_t kSampleNanoseconds = 200'000;
 
 }  // namespace
 
@@ -35,7 +35,7 @@ Worker::Worker(RunCore& core, std::uint32_t index)
       exchange_(core.exchange.get()),
       index_(index),
       newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
-      plain_(exchange_ == nullptr && !core.spill),
+      plain_(exchange_ == nullptr && !core.spill && !core.options.monitor.watches()),
       has_chores_(core.options.progress || core.linger_ticks != 0 ||
                   core.layout.blocking_threads != 0 || core.trace() != nullptr),
       runner_(core, index, *this),
@@ -213,6 +213,7 @@ bool Worker::take_open(Work& work) {
 
 bool Worker::take_open_that_leaves_freely(Work& work) {
   while (runner_.open().take_best(work.block)) {
+    runner_.stats().stages[work.block.stage].published.add(work.block.items);
     // What runs at once needs no place to wait.
     if (!layout_.stages[work.block.stage].gated || leaves_freely(work.block, work.cause)) {
       return true;
@@ -370,6 +371,7 @@ void Worker::publish(const Block& block, FlushCause cause) {
     push_ready(block, cause);
     return;
   }
+  runner_.stats().stages[block.stage].published.add(block.items);
   Block leaving = block;
   if (leaves_freely(leaving, cause)) {
     push_ready(leaving, cause);

@@ -62,6 +62,34 @@ TEST(MonitorTest, ShowsWorkersQueuesAndSources) {
       << text.str();
 }
 
+// A drawing made in the middle of a run, by a kernel that has just emitted nine items.
+TEST(MonitorTest, DotShowsWhatIsQueuedRunningAndDone) {
+  const carpool::Monitor monitor;
+  carpool::Graph graph;
+  const auto first = graph.add_stage<int>({.name = "first"});
+  const auto second = graph.add_stage<int>({.name = "second", .block_items = 4, .concurrency = 1});
+  std::string drawing;
+  graph.set_kernel(first, [&](const carpool::Batch<int>&, carpool::Emitter& out) {
+    for (int i = 0; i < 9; ++i) {
+      out.emit(second, 0, i);
+    }
+    drawing = graph.dot(monitor.look().value());
+  });
+  graph.set_kernel(second, [](const carpool::Batch<int>&, carpool::Emitter&) {});
+  const auto source = graph.add_source({.name = "one"}, [&](auto&, carpool::Emitter& out) {
+    out.emit(first, 0, 0);
+    return carpool::SourceStatus::exhausted;
+  });
+  graph.add_edge(source, first);
+  graph.add_edge(first, second);
+  carpool::run(graph, {.mode = carpool::RunMode::serial, .monitor = monitor});
+  EXPECT_NE(drawing.find("1 queued, 1 running, 0 done"), std::string::npos) << drawing;
+  EXPECT_NE(drawing.find("8 queued, 0 running, 0 done"), std::string::npos) << drawing;
+  EXPECT_NE(drawing.find("1 at once"), std::string::npos) << drawing;
+  EXPECT_NE(drawing.find("exhausted"), std::string::npos) << drawing;
+  EXPECT_NE(drawing.find("stage0 -> stage1"), std::string::npos) << drawing;
+}
+
 // Looking all the time from another thread disturbs nobody.
 TEST(MonitorTest, MayLookAtAnyTime) {
   const carpool::Monitor monitor;

@@ -16,6 +16,8 @@
 
 namespace carpool {
 
+struct RunState;
+
 /// StageOptions describes a stage. Every field but the name has a sensible default.
 struct StageOptions {
   std::string name = {};   ///< For reports, traces and messages.
@@ -133,7 +135,11 @@ class Graph {
   }
 
   /// dot returns the graph in Graphviz's language. Pipe it through `dot -Tsvg`.
-  std::string dot() const;
+  std::string dot() const { return dot(nullptr); }
+
+  /// dot with what Monitor::look() has seen of a run of this graph: what is queued, running and
+  /// done, and the fuller a stage, the stronger its colour. Any thread may call it during the run.
+  std::string dot(const RunState& live) const { return dot(&live); }
 
   const std::vector<Stage>& stages() const { return stages_; }
   const std::vector<Source>& sources() const { return sources_; }
@@ -148,6 +154,7 @@ class Graph {
  private:
   std::uint32_t add_raw_stage(StageOptions options, std::size_t item_bytes, std::size_t item_align);
   void set_raw_kernel(std::uint32_t stage, RawKernel kernel);
+  std::string dot(const RunState* live) const;
   void add_stage_edge(std::uint32_t from, std::uint32_t to);
   void add_source_edge(std::uint32_t from, std::uint32_t to);
 

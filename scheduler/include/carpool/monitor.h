@@ -14,6 +14,12 @@ namespace carpool {
 /// RunState is what every worker and queue of a run is doing. Each number is exact, but they are
 /// not of one instant.
 struct RunState {
+  struct Stage {
+    std::string name = {};
+    std::uint64_t queued = 0;   ///< Items that have left open blocks and are not done.
+    std::uint64_t items = 0;    ///< Items handled so far.
+    std::uint32_t running = 0;  ///< Kernel calls under way.
+  };
   struct Source {
     std::string name = {};
     std::uint32_t inside = 0;  ///< Workers that are in the source now.
@@ -36,9 +42,12 @@ struct RunState {
   bool over = false;            ///< The last worker has left.
   std::int64_t credits = 0;     ///< Free, less those in workers' pockets; may be below zero.
   std::vector<Source> sources = {};
+  std::vector<Stage> stages = {};
   std::vector<Worker> workers = {};
+  std::vector<Worker> blocking_threads = {};  ///< Of blocking stages; they have nothing ready.
+  std::uint64_t spilled_blocks = 0;           ///< In the file now.
 
-  /// print writes a line for the run, and one per source and worker.
+  /// print writes a line for the run, and one per stage, source, worker and thread.
   void print(std::ostream& out) const;
 };
 
@@ -52,13 +61,16 @@ class RunCore;
 ///     state->print(std::cerr); }); carpool::run(graph, {.monitor = monitor});
 ///
 /// Thread safety: look() may be called at any time from any thread. Cost: one store per batch,
-/// whether a monitor is given or not; a look takes some microseconds and stops nobody.
+/// and another per block where a monitor is given; a look takes some microseconds and stops nobody.
 class Monitor {
  public:
   Monitor();
 
   /// A monitor made from nullptr shows nothing. It is the default of RunOptions.
   explicit Monitor(std::nullptr_t) {}
+
+  /// watches tells whether this monitor can show anything.
+  bool watches() const { return shown_ != nullptr; }
 
   /// look returns the state of the run that began last, or nothing if that is over or none began.
   std::optional<RunState> look() const;

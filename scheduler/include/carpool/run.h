@@ -86,6 +86,11 @@ struct RunOptions {
   /// or, if `threads` is given, one made for this run.
   tbb::task_arena* arena = nullptr;
 
+  /// Where the threads of an arena made for this run may be: one NUMA node, one kind of core, one
+  /// thread per core. oneTBB needs its library tbbbind for that, and does without otherwise. Not
+  /// together with `arena`, which has its own.
+  std::optional<tbb::task_arena::constraints> constraints = std::nullopt;
+
   /// Credits: the most live items. Sources wait when they are used up; nothing else ever waits.
   std::uint64_t in_flight = 131072;
 
