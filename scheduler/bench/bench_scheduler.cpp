@@ -225,6 +225,42 @@ void fan_out_formula() {
       1);
 }
 
+// One item becomes ten million, of which nobody had been told: they go to a file, and come back.
+void spilled() {
+  constexpr std::uint32_t kChildren = 10'000'000;
+  carpool::Graph graph;
+  const auto stage = graph.add_stage<std::uint64_t>({.name = "split"});
+  std::vector<Result> sums(2);
+  graph.set_kernel(stage, [&](const carpool::Batch<std::uint64_t>& batch, carpool::Emitter& out) {
+    for (const std::uint64_t item : batch.items) {
+      sums[batch.worker].sum += item;
+      for (std::uint32_t i = 0; item == 0 && i < kChildren; ++i) {
+        out.emit(stage, 0, std::uint64_t{i} + 1);
+      }
+    }
+  });
+  graph.add_source({.name = "one"}, [&](carpool::SourceContext&, carpool::Emitter& out) {
+    out.emit(stage, 0, std::uint64_t{0});
+    return carpool::SourceStatus::exhausted;
+  });
+  const double begin = bench::wall_seconds();
+  const carpool::RunReport report =
+      carpool::run(graph, {.threads = 2, .in_flight = 16384, .overflow = carpool::Overflow::spill});
+  const double seconds = bench::wall_seconds() - begin;
+  if (sums[0].sum + sums[1].sum != std::uint64_t{kChildren} * (kChildren + 1) / 2) {
+    std::fprintf(stderr, "bench-scheduler: spilled items were lost; this is a bug\n");
+    std::exit(1);
+  }
+  const std::string name = "1 in, 1e7 out, undeclared, spilled: ";
+  rows.at_most(
+      name + "peak memory / formula",
+      static_cast<double>(report.peak_bytes) / static_cast<double>(report.worst_case_bytes), "x",
+      1);
+  rows.add(name + "the formula", static_cast<double>(report.worst_case_bytes) / 1024, "KiB");
+  rows.add(name + "the file", static_cast<double>(report.peak_spill_bytes) / 1048576, "MiB");
+  rows.add(name + "wall time per item", seconds * 1e9 / kChildren, "ns");
+}
+
 // A stage that blocks: what waiting for it costs, in time of the processor.
 void waiting() {
   carpool::Graph graph;
@@ -319,6 +355,7 @@ int main(int argc, char** argv) {
   bench::predict(rows, quick);
   allocations();
   fan_out_formula();
+  spilled();
   waiting();
   twins(quick);
   for (const auto& [path, written] : {std::pair{json, json.empty() || rows.write_json(json)},

@@ -32,8 +32,9 @@ std::string limits_of(const StageOptions& options) {
   if (options.concurrency == 0) {
     return "";
   }
-  return "\n" + std::to_string(options.concurrency) +
-         (options.blocking ? " threads of its own" : " at once");
+  return std::string("\n")
+      .append(std::to_string(options.concurrency))
+      .append(options.blocking ? " threads of its own" : " at once");
 }
 
 }  // namespace
@@ -137,9 +138,9 @@ std::string Graph::dot(const RunState* live) const {
     const Source& source = sources_[i];
     std::string label = source.options.name + "\nfan-out " + std::to_string(source.options.fan_out);
     if (live != nullptr) {
-      label += live->sources.at(i).exhausted
-                   ? "\nexhausted"
-                   : "\n" + std::to_string(live->sources[i].inside) + " inside";
+      const RunState::Source& state = live->sources.at(i);
+      label += '\n';
+      label += state.exhausted ? "exhausted" : std::to_string(state.inside) + " inside";
     }
     node("source", i, "shape=house", label, source.successors);
   }
@@ -151,7 +152,8 @@ std::string Graph::dot(const RunState* live) const {
                         limits_of(stage.options);
     if (live != nullptr) {
       const RunState::Stage& state = live->stages.at(i);
-      label += "\n" + std::to_string(state.queued) + " queued, " + std::to_string(state.running) +
+      label += '\n';
+      label += std::to_string(state.queued) + " queued, " + std::to_string(state.running) +
                " running, " + std::to_string(state.items) + " done";
       const double share = static_cast<double>(state.queued) / static_cast<double>(queued);
       shape += ", style=filled, fillcolor=\"0.09 " + std::to_string(share) + " 1.0\"";
