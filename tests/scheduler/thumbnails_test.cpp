@@ -11,9 +11,13 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "files.h"
 #include "image.h"
+#include "tests/tools/process.h"
 
 namespace {
 
@@ -70,7 +74,6 @@ TEST(ShrinkTest, KeepsTheShapeAndSmallImages) {
 class ThumbnailsTest : public testing::Test {
  protected:
   ThumbnailsTest() {
-    fs::remove_all(folder_);
     fs::create_directories(from_ / "deeper");
     options_.from = from_;
     options_.to = folder_ / "to";
@@ -80,7 +83,6 @@ class ThumbnailsTest : public testing::Test {
       bad_[path.filename()] = reason;
     };
   }
-  ~ThumbnailsTest() override { fs::remove_all(folder_); }
 
   static std::array<std::uint8_t, 3> color_of(std::uint32_t i) {
     return {static_cast<std::uint8_t>(i * 7), static_cast<std::uint8_t>(i * 5),
@@ -115,7 +117,8 @@ class ThumbnailsTest : public testing::Test {
     return count;
   }
 
-  const fs::path folder_ = fs::path(testing::TempDir()) / "carpool_thumbnails_test";
+  const carpool::tests::TemporaryFolder temporary_;
+  const fs::path folder_ = temporary_ / "";
   const fs::path from_ = folder_ / "from";
   ThumbnailOptions options_;
   std::map<std::string, std::string> bad_;
@@ -141,6 +144,9 @@ TEST_F(ThumbnailsTest, BadFilesAreReportedAndSkipped) {
   cut = read_bytes(from_ / name_of(1));
   cut.resize(100);
   write_bytes(from_ / "cut.jpg", cut);
+  cut = read_bytes(from_ / name_of(1));
+  cut.resize(cut.size() - 20);  // in the middle of the pixels
+  write_bytes(from_ / "short.jpg", cut);
   write_bytes(from_ / "empty.jpeg", {});
   write_bytes(from_ / "text.png", Bytes(1000, std::byte{'x'}));
   Bytes huge = read_bytes(from_ / name_of(2));
@@ -150,9 +156,10 @@ TEST_F(ThumbnailsTest, BadFilesAreReportedAndSkipped) {
                      from_ / "dangling.png");  // no regular file: not one of them
   const ThumbnailSummary summary = make_thumbnails(options_);
   EXPECT_EQ(summary.made, 10U);
-  EXPECT_EQ(summary.bad, 5U);
-  EXPECT_EQ(bad_.size(), 5U);
-  for (const char* name : {"cut.png", "cut.jpg", "empty.jpeg", "text.png", "huge.png"}) {
+  EXPECT_EQ(summary.bad, 6U);
+  EXPECT_EQ(bad_.size(), 6U);
+  for (const char* name :
+       {"cut.png", "cut.jpg", "short.jpg", "empty.jpeg", "text.png", "huge.png"}) {
     EXPECT_FALSE(bad_[name].empty()) << name;
   }
   EXPECT_EQ(files_made(), 10U);
@@ -202,7 +209,76 @@ TEST_F(ThumbnailsTest, FewImagesAreInMemoryAtOnce) {
 TEST_F(ThumbnailsTest, AFolderThatCannotBeWrittenEndsTheRun) {
   write_images(5);
   options_.to = from_ / name_of(2);  // a file
-  EXPECT_THROW(make_thumbnails(options_), fs::filesystem_error);
+  EXPECT_THROW(make_thumbnails(options_), WriteError);
+}
+
+TEST_F(ThumbnailsTest, AThumbnailThatCannotBeWrittenLeavesNothingHalfDone) {
+  write_images(1);
+  fs::create_directories(thumbnail(0));  // a folder of that name
+  EXPECT_THROW(make_thumbnails(options_), WriteError);
+  EXPECT_EQ(files_made(), 0U);
+}
+
+TEST_F(ThumbnailsTest, ThumbnailsAreNotMadeOfThumbnails) {
+  write_images(10);
+  options_.to = from_ / "deeper" / "small";
+  EXPECT_EQ(make_thumbnails(options_).made, 10U);
+  EXPECT_EQ(make_thumbnails(options_).up_to_date, 10U);
+  EXPECT_EQ(files_made(), 10U);
+  options_.to = from_ / "deeper" / "..";
+  EXPECT_THROW(make_thumbnails(options_), std::invalid_argument);
+}
+
+TEST_F(ThumbnailsTest, AMissingFolderIsNamed) {
+  options_.from = folder_ / "nowhere";
+  EXPECT_THROW(make_thumbnails(options_), ReadError);
+}
+
+using carpool::tests::Outcome;
+
+Outcome program(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), THUMBNAILS_PROGRAM);
+  return carpool::tests::Process(arguments).Wait();
+}
+
+TEST_F(ThumbnailsTest, TheProgramSaysHowItIsUsed) {
+  const Outcome help = program({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_NE(help.out.find("--in-flight"), std::string::npos) << help.out;
+  EXPECT_EQ(help.err, "");
+  const std::vector<std::string> wrong[] = {{},
+                                            {"a"},
+                                            {"a", "b", "c"},
+                                            {"a", "b", "--size"},
+                                            {"a", "b", "--size", "0"},
+                                            {"a", "b", "--size", "x"},
+                                            {"a", "b", "--in-flight", "3x"},
+                                            {"a", "b", "--threads", "-1"},
+                                            {"a", "b", "--bogus"}};
+  for (const auto& arguments : wrong) {
+    const Outcome outcome = program(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+  }
+}
+
+TEST_F(ThumbnailsTest, TheProgramsExitCodesTellHowItWent) {
+  write_images(20);
+  const std::string to = options_.to;
+  Outcome outcome = program({from_, to, "--size", "32"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, "20 made, 0 up to date, 0 bad, 0 left\n");
+  write_bytes(from_ / "text.png", Bytes(1000, std::byte{'x'}));
+  outcome = program({from_, to, "--quiet", "--threads", "1"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.out, "0 made, 20 up to date, 1 bad, 0 left\n");
+  EXPECT_EQ(outcome.err, "thumbnails: skipped " + (from_ / "text.png").string() +
+                             ": neither a PNG nor a JPEG\n");
+  EXPECT_EQ(program({from_, from_}).exit_code, 2);
+  outcome = program({folder_ / "nowhere", to});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.err.find("nowhere"), std::string::npos) << outcome.err;
+  EXPECT_EQ(program({from_, from_ / name_of(2), "--quiet"}).exit_code, 4);
 }
 
 }  // namespace

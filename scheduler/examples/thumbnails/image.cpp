@@ -2,6 +2,7 @@
 #include "image.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -66,6 +67,34 @@ Image decode_jpeg(std::span<const std::byte> file) {
   return image;
 }
 
+struct Range {
+  std::uint32_t begin;
+  std::uint32_t end;
+};
+
+// The pixels of a side of `from` that become pixel i of one of `to`.
+Range range_of(std::uint32_t i, std::uint32_t from, std::uint32_t to) {
+  const auto edge = [&](std::uint64_t at) { return static_cast<std::uint32_t>(at * from / to); };
+  return {edge(i), edge(std::uint64_t{i} + 1)};
+}
+
+void append_average(const Image& image, Range rows, Range columns, std::vector<std::uint8_t>& rgb) {
+  const std::uint64_t pixels = std::uint64_t{rows.end - rows.begin} * (columns.end - columns.begin);
+  std::array<std::uint64_t, 3> sums;
+  sums.fill(pixels / 2);  // rounds
+  for (std::uint32_t row = rows.begin; row < rows.end; ++row) {
+    const std::uint8_t* at = &image.rgb[(std::size_t{row} * image.width + columns.begin) * 3];
+    for (std::uint32_t column = columns.begin; column < columns.end; ++column, at += 3) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        sums[channel] += at[channel];
+      }
+    }
+  }
+  for (const std::uint64_t sum : sums) {
+    rgb.push_back(static_cast<std::uint8_t>(sum / pixels));
+  }
+}
+
 }  // namespace
 
 Image decode(std::span<const std::byte> file) {
@@ -94,25 +123,10 @@ Image shrink(const Image& image, std::uint32_t size) {
   };
   Image small{.width = scaled(image.width), .height = scaled(image.height), .rgb = {}};
   small.rgb.reserve(std::size_t{3} * small.width * small.height);
-  const auto edge = [](std::uint32_t i, std::uint32_t from, std::uint32_t to) {
-    return static_cast<std::uint32_t>(std::uint64_t{i} * from / to);
-  };
   for (std::uint32_t y = 0; y < small.height; ++y) {
-    const std::uint32_t top = edge(y, image.height, small.height);
-    const std::uint32_t bottom = edge(y + 1, image.height, small.height);
+    const Range rows = range_of(y, image.height, small.height);
     for (std::uint32_t x = 0; x < small.width; ++x) {
-      const std::uint32_t left = edge(x, image.width, small.width);
-      const std::uint32_t right = edge(x + 1, image.width, small.width);
-      const std::uint64_t pixels = std::uint64_t{bottom - top} * (right - left);
-      for (std::uint32_t channel = 0; channel < 3; ++channel) {
-        std::uint64_t sum = pixels / 2;  // rounds
-        for (std::uint32_t row = top; row < bottom; ++row) {
-          for (std::uint32_t column = left; column < right; ++column) {
-            sum += image.rgb[(std::size_t{row} * image.width + column) * 3 + channel];
-          }
-        }
-        small.rgb.push_back(static_cast<std::uint8_t>(sum / pixels));
-      }
+      append_average(image, rows, range_of(x, image.width, small.width), small.rgb);
     }
   }
   return small;

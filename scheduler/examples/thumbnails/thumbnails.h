@@ -30,6 +30,7 @@ struct ThumbnailSummary {
 };
 
 /// make_thumbnails does what is not done yet. A thumbnail appears in full or not at all, so that it
-/// may be stopped and started again at any time. Throws std::filesystem::filesystem_error if a
-/// folder cannot be read or a thumbnail not be written.
+/// may be stopped and started again at any time. At most `in_flight` images are in memory, of which
+/// about one per thread is decoded. Throws ReadError or WriteError (files.h) if a folder cannot be
+/// read or a thumbnail not be written, and std::invalid_argument if both folders are the same.
 ThumbnailSummary make_thumbnails(const ThumbnailOptions& options);
