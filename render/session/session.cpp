@@ -162,6 +162,8 @@ void CheckOutputs(const RenderSettings& settings) {
 void Describe(const Workspace& w, const RenderSettings& settings, RenderSummary& summary) {
   summary.scene = settings.scene_path;
   summary.camera = w.scene().camera_name;
+  summary.view = w.scene().tables.camera;
+  summary.eye = w.scene().tables.origin;
   summary.environment = w.scene().environment_name;
   summary.executor_reason = w.plan().executor_reason;
   summary.isa = w.kernels().isa;

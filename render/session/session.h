@@ -1,6 +1,7 @@
 // One render from settings to files: load, plan, build, render in passes, save.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <string>
@@ -17,6 +18,8 @@ struct RenderSummary {
   ExitCode code =
       ExitCode::done;  // done, no (noise target missed in the time given) or interrupted
   std::string output, scene, camera, environment, executor, executor_reason, isa;
+  stages::Camera view;
+  std::array<double, 3> eye = {};  // where it is, metres in the file's space
   int width = 0, height = 0;
   int samples = 0;  // that every pixel has at least
   uint64_t seed = 0;

@@ -30,6 +30,21 @@ double SchedulerShare(const RunReport& r) {
   return busy > 0 ? r.scheduler_seconds / busy : 0;
 }
 
+/// The camera as it was placed, for programs that are to see the same.
+nlohmann::ordered_json ViewJson(const RenderSummary& s) {
+  const float* m = s.view.world_from_camera;
+  const auto axis = [&](int column) {
+    return nlohmann::json{m[column], m[4 + column], m[8 + column]};
+  };
+  return {{"projection", s.view.orthographic != 0 ? "orthographic" : "perspective"},
+          {"position", s.eye},
+          {"right", axis(0)},
+          {"up", axis(1)},
+          {"back", axis(2)},
+          {"half_width", s.view.half_width},
+          {"half_height", s.view.half_height}};
+}
+
 }  // namespace
 
 std::string RenderSummary::Text() const {
@@ -57,6 +72,7 @@ std::string RenderSummary::Json() const {
       {"scene", scene},
       {"output", output},
       {"camera", camera},
+      {"view", ViewJson(*this)},
       {"environment", environment},
       {"executor", executor},
       {"executor_reason", executor_reason},
