@@ -22,6 +22,8 @@ constexpr NameTable<Isa, 4> kIsas{
     {{"auto", Isa::automatic}, {"sse4", Isa::sse4}, {"avx2", Isa::avx2}, {"avx512", Isa::avx512}}};
 constexpr NameTable<DirectLight, 3> kDirectLights{
     {{"mis", DirectLight::mis}, {"light", DirectLight::light}, {"bsdf", DirectLight::bsdf}}};
+constexpr NameTable<LightChoice, 2> kLightChoices{
+    {{"tree", LightChoice::tree}, {"uniform", LightChoice::uniform}}};
 constexpr NameTable<Aov, 7> kAovs{{{"albedo", Aov::albedo},
                                    {"normal", Aov::normal},
                                    {"depth", Aov::depth},
@@ -124,6 +126,9 @@ std::string_view Name(Isa isa) {
 std::string_view Name(DirectLight direct) {
   return NameIn(kDirectLights, direct);
 }
+std::string_view Name(LightChoice lights) {
+  return NameIn(kLightChoices, lights);
+}
 std::string_view Name(Aov aov) {
   return NameIn(kAovs, aov);
 }
@@ -140,6 +145,10 @@ Isa ParseIsa(std::string_view name) {
 
 DirectLight ParseDirectLight(std::string_view name) {
   return Lookup(kDirectLights, "--direct", name);
+}
+
+LightChoice ParseLightChoice(std::string_view name) {
+  return Lookup(kLightChoices, "--lights", name);
 }
 
 AovSet ParseAovs(std::string_view list) {

@@ -26,6 +26,13 @@ enum class DirectLight {
   bsdf,   // BSDF sampling alone; punctual lights, which it cannot hit, are sampled still
 };
 
+/// Which light a vertex samples. As with DirectLight, only the noise differs: the second shows what
+/// the first is worth.
+enum class LightChoice {
+  tree,     // by a bound on what each would give the vertex (Conty Estevez and Kulla 2018)
+  uniform,  // any, all alike
+};
+
 /// Image layers beside the beauty.
 enum class Aov : std::uint32_t {
   albedo = 1u << 0,
@@ -92,6 +99,7 @@ struct RenderSettings {
   /// Vertices before Russian roulette may end dark paths, 0..kMaxDepth; it does so without bias.
   int roulette_depth = kRouletteDepth;
   DirectLight direct = DirectLight::mis;
+  LightChoice lights = LightChoice::tree;
   /// The brightest channel a sample may have, in the image's unit; brighter ones are scaled down,
   /// which is a bias that the summary states. 0: no clamp.
   double clamp = 0;
@@ -128,6 +136,7 @@ std::string_view Name(Executor executor);
 std::string_view Name(Policy policy);
 std::string_view Name(Isa isa);
 std::string_view Name(DirectLight direct);
+std::string_view Name(LightChoice lights);
 std::string_view Name(Aov aov);
 
 // The reverse; each throws Error(ExitCode::usage) that lists the names it knows.
@@ -135,6 +144,7 @@ Executor ParseExecutor(std::string_view name);
 Policy ParsePolicy(std::string_view name);
 Isa ParseIsa(std::string_view name);
 DirectLight ParseDirectLight(std::string_view name);
+LightChoice ParseLightChoice(std::string_view name);
 AovSet ParseAovs(std::string_view comma_separated);  // "albedo,normal", or "all"
 
 }  // namespace carpool::render

@@ -102,6 +102,8 @@ stages::KernelContext MakeContext(const PreparedScene& scene, const Plan& plan,
   c.max_depth = static_cast<uint32_t>(settings.max_depth);
   c.roulette_depth = static_cast<uint32_t>(settings.roulette_depth);
   c.direct = DirectSampling(settings.direct);
+  if (settings.lights == LightChoice::uniform)
+    c.lights.uniform_count = static_cast<int32_t>(scene.tables.lights.lights.size());
   return c;
 }
 

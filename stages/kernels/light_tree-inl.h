@@ -165,10 +165,26 @@ struct Refill {
   }
 };
 
+/// Any of `view.uniform_count` lights; those that are not in the tree give no sample.
+template <class D>
+HWY_INLINE LightPick<D> PickUniform(D d, const LightView& view, Mask<D> active, Real<D> u) {
+  const IntTag<D> di;
+  const Real<D> place = u * Splat(d, view.uniform_count);
+  const Real<D> whole =
+      hn::Min(hn::Floor(place), Splat(d, static_cast<double>(view.uniform_count) - 1));
+  const Int<D> light = hn::ConvertTo(di, whole);
+  const Int<D> leaf = FieldInt(d, view.lights, light, offsetof(Light, leaf));
+  const Mask<D> in_tree = hn::And(active, ToMask(d, hn::Gt(leaf, hn::Set(di, kNone))));
+  return {hn::IfThenElse(ToIntMask(d, in_tree), light, hn::Set(di, kNone)),
+          hn::IfThenElseZero(in_tree, Splat(d, 1.0 / view.uniform_count)),
+          hn::Min(place - whole, Splat(d, kLargestBelowOne))};
+}
+
 /// Descends from the root in every active lane, with one number per lane.
 template <class D>
 HWY_INLINE LightPick<D> PickLight(D d, const LightView& view, Mask<D> active,
                                   const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
+  if (view.uniform_count > 0) return PickUniform(d, view, active, u);
   const IntTag<D> di;
   const Int<D> zero = hn::Zero(di), none = hn::Set(di, kNone);
   const Receiver<D> receiver = MakeReceiver(d, position, normal);
@@ -219,6 +235,7 @@ HWY_INLINE Real<D> PickProbability(D d, const LightView& view, Mask<D> active,
       lit, FieldInt(d, view.lights, hn::IfThenElseZero(lit, light), offsetof(Light, leaf)),
       hn::Set(di, kNone));
   active = ToMask(d, hn::Gt(node, hn::Set(di, kNone)));
+  if (view.uniform_count > 0) return hn::IfThenElseZero(active, Splat(d, 1.0 / view.uniform_count));
   Real<D> probability = hn::IfThenElseZero(active, Splat(d, 1));
 
   while (!hn::AllFalse(d, active)) {

@@ -34,6 +34,7 @@ struct LightView {
   const int32_t* infinite_lights = nullptr;
   int32_t node_count = 0;
   int32_t infinite_count = 0;
+  int32_t uniform_count = 0;  // > 0: the tree is not asked, all so many lights are chosen alike
   float tree_probability = 0;  // see LightTables
   float infinite_probability = 0;
   float environment_probability = 0;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "render/session/workspace.h"
+#include "tools/bench/film_price.h"
 #include "tools/bench/replay.h"
 
 namespace carpool::tools {
@@ -38,6 +39,15 @@ double ShareOf(const RunReport& r, double seconds) {
   return all > 0 ? seconds / all : 0;
 }
 
+/// Seconds per item of the shading stage.
+double ShadingCost(const RunReport& r) {
+  for (const StageReport& stage : r.stages) {
+    if (stage.name == "shade" && stage.items > 0)
+      return stage.kernel_seconds / static_cast<double>(stage.items);
+  }
+  return 0;
+}
+
 /// Seconds and rays of one executor over the rounds.
 struct Track {
   stages::Executor& executor;
@@ -56,21 +66,26 @@ struct Track {
 void MeasureRounds(const BenchOptions& o, render::Workspace& w, render::Workspace& loose,
                    const stages::ExecutorOptions& options, SceneFigures& f) {
   const auto megakernel = stages::MakeMegakernel(w.context(), w.kernels(), options);
-  Track wave{w.executor()}, mega{*megakernel}, fast{loose.executor()};
+  stages::ExecutorOptions narrow = options;
+  narrow.simd = false;
+  const auto one_lane =
+      stages::MakeWavefront(w.context(), w.kernels(), w.scene().tables.geometry.placements, narrow);
+  Track wave{w.executor()}, mega{*megakernel}, fast{loose.executor()}, one{*one_lane};
   const stages::CameraPass pass{.sample_count = static_cast<uint32_t>(o.samples)};
   const RayLog log = RecordRays(w.context(), w.kernels(), pass.sample_count);
-  std::vector<double> plain, sorted, over_mega, price, share, idle;
+  std::vector<double> plain, sorted, over_mega, price, gain, share, idle;
   const auto speed = [&](double seconds) {
     return static_cast<double>(log.total()) / seconds / 1e6;
   };
   for (int round = 0; round < o.rounds + 1; ++round) {
-    for (Track* track : {&mega, &wave, &fast}) track->Run(pass, round > 0);
+    for (Track* track : {&mega, &wave, &one, &fast}) track->Run(pass, round > 0);
     const double in_order = Replay(w.context().trace, log, false, *options.arena);
     const double in_windows = Replay(w.context().trace, log, true, *options.arena);
     if (round == 0) continue;
     plain.push_back(speed(in_order));
     sorted.push_back(speed(in_windows));
     over_mega.push_back(mega.last.seconds / wave.last.seconds);
+    gain.push_back(ShadingCost(one.last.schedule) / ShadingCost(wave.last.schedule));
     price.push_back(wave.last.seconds / fast.last.seconds);
     const RunReport& r = wave.last.schedule;
     share.push_back(ShareOf(r, r.scheduler_seconds));
@@ -84,6 +99,10 @@ void MeasureRounds(const BenchOptions& o, render::Workspace& w, render::Workspac
   f.least_over_mega = *std::min_element(over_mega.begin(), over_mega.end());
   f.most_over_mega = *std::max_element(over_mega.begin(), over_mega.end());
   f.robust_price = Median(price);
+  f.shading_gain = Median(gain);
+  const FilmPrice film = MeasureFilmPrice(w.context().width, w.context().height, *options.arena);
+  const double samples = static_cast<double>(log.camera.size());
+  f.film_price = (film.exact - film.floats) * 1e-9 * samples / (Median(wave.seconds) * f.threads);
   f.scheduler_share = Median(share);
   f.idle_share = Median(idle);
   f.schedule = wave.last.schedule;
@@ -162,6 +181,8 @@ std::vector<Row> RowsOf(const SceneFigures& f) {
   add("wavefront over bare Embree", f.WaveOverEmbree(), "x", ">= 0.5", f.WaveOverEmbree() >= 0.5);
   add("megakernel over bare Embree", f.MegaOverEmbree(), "x");
   add("time with ROBUST over without", f.robust_price, "x");
+  add("exact film sums instead of floats", 100 * f.film_price, "% of time");
+  add("shading at one lane over full width", f.shading_gain, "x");
   add("scheduler's share of worker time", 100 * f.scheduler_share, "%", "<= 1",
       f.scheduler_share <= 0.01);
   add("bubbles", 100 * f.idle_share, "%");

@@ -41,6 +41,8 @@ struct SceneFigures {
   double over_mega = 0;                            // wavefront's speed / megakernel's
   double least_over_mega = 0, most_over_mega = 0;  // of all rounds
   double robust_price = 0;     // seconds with Embree's ROBUST flag / without, wavefront
+  double film_price = 0;       // exact sums instead of floats, as a share of the wavefront's time
+  double shading_gain = 0;     // time of the shading stage at one lane / at full width
   double scheduler_share = 0;  // of worker time, 0..1
   double idle_share = 0;
   double mebibytes = 0;  // path state and queues

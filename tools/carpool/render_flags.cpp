@@ -76,6 +76,10 @@ void AddSceneFlags(CLI::App& command, RenderFlags& flags) {
                   "direct light by mis (default), light or bsdf sampling; only the noise differs")
       ->type_name("NAME");
   command
+      .add_option("--lights", flags.lights,
+                  "light to sample chosen by the tree (default) or uniform; only the noise differs")
+      ->type_name("NAME");
+  command
       .add_option("--executor", flags.executor,
                   "wavefront, megakernel or auto (default); the image is the same")
       ->type_name("NAME");
@@ -145,6 +149,7 @@ RenderSettings Settle(const RenderFlags& flags) {
   s.policy = render::ParsePolicy(flags.policy);
   s.isa = render::ParseIsa(flags.isa);
   s.direct = render::ParseDirectLight(flags.direct);
+  s.lights = render::ParseLightChoice(flags.lights);
   s.write_png = !flags.no_png;
   s.robust = !flags.no_robust;
   if (s.output_path.empty() && !flags.explain && flags.needs_output)

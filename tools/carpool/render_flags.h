@@ -17,7 +17,8 @@ namespace carpool::tools {
 /// parsing, so it must live as long as the command.
 struct RenderFlags {
   render::RenderSettings settings;
-  std::string size, aovs, executor = "auto", policy = "deepest", isa = "auto", direct = "mis";
+  std::string size, aovs, executor = "auto", policy = "deepest", isa = "auto", direct = "mis",
+                          lights = "tree";
   std::optional<int> samples;
   bool no_png = false, no_robust = false;
   std::string pixel;  // "X,Y"
