@@ -34,7 +34,8 @@ void BlockingWorker::perform(std::uint64_t virtual_ticks) {
   runner_.credits().return_all();  // before looking at the sources: see Gate
   runner_.stats().doing.set(kAway);
   core_.exchange->finish_call(stage_, core_.wants_a_worker());
-  if (core_.gate->hungry(core_.gate->view())) {
+  // Nobody is woken for nothing: what there is to do has landed, or is the errand.
+  if (core_.gate->any_ready() && core_.gate->hungry(core_.gate->view())) {
     core_.invite();
   }
 }

@@ -154,9 +154,14 @@ std::uint32_t OpenTable::choose() {
     }
   }
   const Bitmap& fullest = grades_[static_cast<std::uint32_t>(std::bit_width(grades_in_use_) - 1)];
-  cursor_ =
-      policy_.kind() == Policy::Kind::deepest_first ? fullest.first() : fullest.first_from(cursor_);
-  return cursor_;
+  // By turns: while a bin waits for its turn it becomes fuller.
+  std::uint32_t bit = fullest.first_from(cursor_);
+  if (policy_.kind() == Policy::Kind::deepest_first) {
+    const std::uint32_t deepest = fullest.first();
+    bit = layout_.stage_of_bit[bit] == layout_.stage_of_bit[deepest] ? bit : deepest;
+  }
+  cursor_ = bit + 1;
+  return bit;
 }
 
 std::uint32_t OpenTable::choose_by_lane_function() {
