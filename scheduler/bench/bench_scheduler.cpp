@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <thread>
@@ -310,8 +311,66 @@ void twins(bool quick) {
            ratio([&] { sssp::dijkstra(grid); }, [&] { sssp::delta_stepping(grid, 2, 50); }), "x");
 }
 
+void costs(bool quick) {
+  const Keys few{.stages = 1, .keys = 64};
+  const Keys many{.stages = 16, .keys = 64};
+  compare(20, 1, few, false);
+  compare(20, 1, many, !quick);
+  few_items_many_keys();
+  if (quick) {
+    return;
+  }
+  compare(20, 2, few, false);
+  compare(20, 2, many, true);
+  compare(100, 1, few, false);
+  compare(100, 2, few, false);
+  compare(100, 1, many, true);
+  compare(100, 2, many, true);
+  compare(500, 1, few, false);
+  compare(500, 2, few, false);
+}
+
+struct Group {
+  const char* name;
+  bool in_quick;
+  std::function<void(bool quick)> measure;
+};
+
+// In this order: fan_out must come before any thread has been started.
+const Group kGroups[] = {
+    {"memory", true, fan_out},
+    {"costs", true, costs},
+    {"tables", false, [](bool) { tables(); }},
+    {"tail", false,
+     [](bool) {
+       long_tail(20);
+       long_tail(100);
+     }},
+    {"scaling", false, [](bool) { scaling(); }},
+    {"prediction", true, [](bool quick) { bench::predict(rows, quick); }},
+    {"bounds", true,
+     [](bool) {
+       allocations();
+       fan_out_formula();
+       spilled();
+     }},
+    {"waiting", true, [](bool) { waiting(); }},
+    {"twins", true, twins},
+};
+
+bool is_group(const std::string& name) {
+  return std::any_of(std::begin(kGroups), std::end(kGroups),
+                     [&](const Group& group) { return group.name == name; });
+}
+
 int usage() {
-  std::fprintf(stderr, "usage: bench-scheduler [--json FILE] [--plot FILE.svg] [--quick]\n");
+  std::fprintf(stderr,
+               "usage: bench-scheduler [--json FILE] [--plot FILE.svg] [--quick] [--only GROUP]\n"
+               "groups:");
+  for (const Group& group : kGroups) {
+    std::fprintf(stderr, " %s", group.name);
+  }
+  std::fprintf(stderr, "\n");
   return 2;
 }
 
@@ -320,44 +379,26 @@ int usage() {
 int main(int argc, char** argv) {
   std::string json;
   std::string plot;
+  std::string only;
   bool quick = false;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--json") == 0 && i + 1 < argc) {
       json = argv[++i];
     } else if (std::strcmp(argv[i], "--plot") == 0 && i + 1 < argc) {
       plot = argv[++i];
+    } else if (std::strcmp(argv[i], "--only") == 0 && i + 1 < argc && is_group(argv[i + 1])) {
+      only = argv[++i];
     } else if (std::strcmp(argv[i], "--quick") == 0) {
       quick = true;
     } else {
       return usage();
     }
   }
-  const Keys few{.stages = 1, .keys = 64};
-  const Keys many{.stages = 16, .keys = 64};
-  fan_out(quick);
-  compare(20, 1, few, false);
-  compare(20, 1, many, !quick);
-  few_items_many_keys();
-  if (!quick) {
-    compare(20, 2, few, false);
-    compare(20, 2, many, true);
-    compare(100, 1, few, false);
-    compare(100, 2, few, false);
-    compare(100, 1, many, true);
-    compare(100, 2, many, true);
-    compare(500, 1, few, false);
-    compare(500, 2, few, false);
-    tables();
-    long_tail(20);
-    long_tail(100);
-    scaling();
+  for (const Group& group : kGroups) {
+    if (only.empty() ? group.in_quick || !quick : only == group.name) {
+      group.measure(quick);
+    }
   }
-  bench::predict(rows, quick);
-  allocations();
-  fan_out_formula();
-  spilled();
-  waiting();
-  twins(quick);
   for (const auto& [path, written] : {std::pair{json, json.empty() || rows.write_json(json)},
                                       std::pair{plot, plot.empty() || rows.write_plot(plot)}}) {
     if (!written) {

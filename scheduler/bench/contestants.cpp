@@ -22,11 +22,7 @@ namespace bench {
 namespace {
 
 Result add_up(tbb::combinable<Result>& parts) {
-  return parts.combine([](Result a, const Result& b) {
-    a.sum += b.sum;
-    a.visits += b.visits;
-    return a;
-  });
+  return parts.combine([](Result a, const Result& b) { return a += b; });
 }
 
 // One arena per number of threads, for all contestants and runs: threads take a while to find a new
@@ -44,18 +40,17 @@ Result inlined_loop(const Work& work, const Setup& setup) {
   arena.execute([&] {
     tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, work.items, 512),
                       [&](const auto& range) {
+                        const Work here = work;
                         Result part;
                         for (std::uint64_t id = range.begin(); id != range.end(); ++id) {
-                          Item item = make_item(work, id);
+                          Item item = make_item(here, id);
                           part.visits += item.left;
                           while (item.left > 0) {
-                            visit(work, item);
+                            visit(here, item);
                           }
                           part.retire(item);
                         }
-                        Result& mine = parts.local();
-                        mine.sum += part.sum;
-                        mine.visits += part.visits;
+                        parts.local() += part;
                       });
   });
   return add_up(parts);
@@ -76,16 +71,18 @@ Result carpool_run(const Work& work, const Setup& setup, carpool::RunReport& rep
   }
   for (const auto stage : stages) {
     graph.set_kernel(stage, [&](const carpool::Batch<Item>& batch, carpool::Emitter& out) {
-      Result& mine = parts[batch.worker];
-      mine.visits += batch.items.size();
+      const Work here = work;  // items are bytes to the compiler, which could be those of `work`
+      Result part;
+      part.visits = batch.items.size();
       for (Item item : batch.items) {
-        visit(work, item);
+        visit(here, item);
         if (item.left > 0) {
-          out.emit(stages[stage_of(work, item.hash)], key_of(work, item.hash), item);
+          out.emit(stages[stage_of(here, item.hash)], key_of(here, item.hash), item);
         } else {
-          mine.retire(item);
+          part.retire(item);
         }
       }
+      parts[batch.worker] += part;
     });
   }
   std::atomic<std::uint64_t> next{0};
@@ -110,8 +107,7 @@ Result carpool_run(const Work& work, const Setup& setup, carpool::RunReport& rep
   report = carpool::run(graph, options);
   Result sum;
   for (const Result& part : parts) {
-    sum.sum += part.sum;
-    sum.visits += part.visits;
+    sum += part;
   }
   return sum;
 }
@@ -131,17 +127,16 @@ Result waves(const Work& work, const Setup& setup) {
       while (!items.empty()) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, items.size(), 256),
                           [&](const auto& range) {
+                            const Work here = work;
                             Result part;
                             for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                              visit(work, items[i]);
+                              visit(here, items[i]);
                               ++part.visits;
                               if (items[i].left == 0) {
                                 part.retire(items[i]);
                               }
                             }
-                            Result& mine = parts.local();
-                            mine.sum += part.sum;
-                            mine.visits += part.visits;
+                            parts.local() += part;
                           });
         std::erase_if(items, [](const Item& item) { return item.left == 0; });
       }

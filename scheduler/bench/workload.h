@@ -77,6 +77,11 @@ struct alignas(64) Result {
   std::uint64_t sum = 0;
   std::uint64_t visits = 0;
   void retire(const Item& item) { sum += mix(item.hash + item.id); }
+  Result& operator+=(const Result& other) {
+    sum += other.sum;
+    visits += other.visits;
+    return *this;
+  }
 };
 
 inline double cpu_seconds() {

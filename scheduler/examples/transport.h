@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
@@ -55,44 +56,64 @@ inline double random(Particle& particle) {
   return (static_cast<double>(x >> 11) + 0.5) * 0x1p-53;
 }
 
-enum class Event { collide, cross, reflect, transmit };
-
-class Slab {
- public:
-  explicit Slab(std::vector<Layer> layers) : layers_(std::move(layers)) {}
-
-  std::uint32_t layers() const { return static_cast<std::uint32_t>(layers_.size()); }
-
-  static Particle born(std::uint32_t id) { return {.depth = 0, .cosine = 1, .id = id, .event = 0}; }
-
-  // fly moves a particle to its collision, or over the border to the next layer, which it sets.
-  Event fly(Particle& particle, std::uint32_t& layer) const {
-    const double begin = layer == 0 ? 0.0 : layers_[layer - 1].end;
-    const double flight = -std::log(random(particle)) / layers_[layer].sigma * particle.cosine;
-    const double to = particle.depth + flight;
-    if (to < begin) {
-      particle.depth = begin;
-      return layer == 0 ? Event::reflect : (--layer, Event::cross);
-    }
-    if (to > layers_[layer].end) {
-      particle.depth = layers_[layer].end;
-      return layer + 1 == layers() ? Event::transmit : (++layer, Event::cross);
-    }
-    particle.depth = to;
-    return Event::collide;
-  }
+// Medium is a layer that knows where it begins.
+struct Medium : Layer {
+  double begin;
 
   // survives decides a collision, and turns the particle into a random direction.
-  bool survives(Particle& particle, std::uint32_t layer) const {
-    if (random(particle) >= layers_[layer].scattering) {
+  bool survives(Particle& particle) const {
+    if (random(particle) >= scattering) {
       return false;
     }
     particle.cosine = 2 * random(particle) - 1;
     return true;
   }
 
+  // fly moves a particle to its collision (0), or to the border before it, beyond which lies the
+  // next layer (1) or the one before (-1).
+  int fly(Particle& particle) const {
+    const double to = destination(particle);
+    if (to < begin) {
+      particle.depth = begin;
+      return -1;
+    }
+    if (to > end) {
+      particle.depth = end;
+      return 1;
+    }
+    particle.depth = to;
+    return 0;
+  }
+
+  // fly_without_branch does the same, for many particles that do not wait for each other.
+  int fly_without_branch(Particle& particle) const {
+    const double to = destination(particle);
+    particle.depth = std::min(std::max(to, begin), end);
+    return static_cast<int>(to > end) - static_cast<int>(to < begin);
+  }
+
  private:
-  std::vector<Layer> layers_;
+  double destination(Particle& particle) const {
+    return particle.depth + -std::log(random(particle)) / sigma * particle.cosine;
+  }
+};
+
+class Slab {
+ public:
+  explicit Slab(const std::vector<Layer>& layers) {
+    double begin = 0;
+    for (const Layer& layer : layers) {
+      media_.push_back({layer, std::exchange(begin, layer.end)});
+    }
+  }
+
+  std::uint32_t layers() const { return static_cast<std::uint32_t>(media_.size()); }
+  const Medium& medium(std::uint32_t layer) const { return media_[layer]; }
+
+  static Particle born(std::uint32_t id) { return {.depth = 0, .cosine = 1, .id = id, .event = 0}; }
+
+ private:
+  std::vector<Medium> media_;
 };
 
 // The history-based loop: one particle after the other, to its end.
@@ -102,22 +123,17 @@ inline Tally by_history(const Slab& slab, std::uint32_t first, std::uint32_t las
     Particle particle = Slab::born(id);
     std::uint32_t layer = 0;
     for (bool alive = true; alive;) {
-      switch (slab.fly(particle, layer)) {
-        case Event::collide:
-          ++tally.collisions;
-          alive = slab.survives(particle, layer);
-          tally.absorbed += alive ? 0 : 1;
-          break;
-        case Event::cross:
-          break;
-        case Event::reflect:
-          ++tally.reflected;
-          alive = false;
-          break;
-        case Event::transmit:
-          ++tally.transmitted;
-          alive = false;
-          break;
+      const int step = slab.medium(layer).fly(particle);
+      if (step == 0) {
+        ++tally.collisions;
+        alive = slab.medium(layer).survives(particle);
+        tally.absorbed += alive ? 0 : 1;
+        continue;
+      }
+      layer += static_cast<std::uint32_t>(step);  // below the first comes the largest number
+      if (layer >= slab.layers()) {
+        ++(step < 0 ? tally.reflected : tally.transmitted);
+        alive = false;
       }
     }
   }
@@ -141,59 +157,64 @@ inline Tally by_history_parallel(const Slab& slab, std::uint32_t count, std::uin
   });
 }
 
-// The event-based version: the same functions, as a graph of two stages.
+// The event-based version: the same functions, as a graph of two stages. An event is what happens
+// to a particle in one place, and the flight to the next.
 inline Tally by_event(const Slab& slab, std::uint32_t count, std::uint32_t threads,
                       bool print_report) {
   std::vector<Tally> tallies(4096);
   carpool::Graph graph;
-  const auto fly = graph.add_stage<Particle>({.name = "fly", .bins = slab.layers()});
+  const auto enter = graph.add_stage<Particle>({.name = "enter", .bins = slab.layers()});
   const auto collide =
       graph.add_stage<Particle>({.name = "collide", .bins = slab.layers(), .rank = 1});
-  graph.set_kernel(fly, [&](const carpool::Batch<Particle>& batch, carpool::Emitter& out) {
-    Tally& tally = tallies[batch.worker];
-    for (Particle particle : batch.items) {
-      std::uint32_t layer = batch.bin;
-      switch (slab.fly(particle, layer)) {
-        case Event::collide:
-          out.emit(collide, layer, particle);
-          break;
-        case Event::cross:
-          out.emit(fly, layer, particle);
-          break;
-        case Event::reflect:
-          ++tally.reflected;
-          break;
-        case Event::transmit:
-          ++tally.transmitted;
-          break;
-      }
+  // Where a particle goes next is data, not a branch that nobody could foresee, and the medium is
+  // the same for the whole batch: that is what events have over histories.
+  const std::array next_stage{collide, enter};
+  const auto fly = [next_stage, layers = slab.layers()](const Medium& medium, std::uint32_t layer,
+                                                        Particle& particle, Tally& tally,
+                                                        carpool::Emitter& out) {
+    const int step = medium.fly_without_branch(particle);
+    const std::uint32_t to = layer + static_cast<std::uint32_t>(step);
+    if (to < layers) {
+      out.emit(next_stage[step != 0], to, particle);
+    } else {
+      ++(step < 0 ? tally.reflected : tally.transmitted);
     }
+  };
+  graph.set_kernel(enter, [&](const carpool::Batch<Particle>& batch, carpool::Emitter& out) {
+    const Medium medium = slab.medium(batch.bin);
+    Tally tally;
+    for (Particle particle : batch.items) {
+      fly(medium, batch.bin, particle, tally, out);
+    }
+    tallies[batch.worker] += tally;
   });
   graph.set_kernel(collide, [&](const carpool::Batch<Particle>& batch, carpool::Emitter& out) {
-    Tally& tally = tallies[batch.worker];
+    const Medium medium = slab.medium(batch.bin);
+    Tally tally{.collisions = batch.items.size()};
     for (Particle particle : batch.items) {
-      ++tally.collisions;
-      if (slab.survives(particle, batch.bin)) {
-        out.emit(fly, batch.bin, particle);
+      if (medium.survives(particle)) {
+        fly(medium, batch.bin, particle, tally, out);
       } else {
         ++tally.absorbed;
       }
     }
+    tallies[batch.worker] += tally;
   });
   std::atomic<std::uint32_t> next{0};
   const auto beam = graph.add_source(
       {.name = "beam", .concurrency = 0}, [&](carpool::SourceContext& ctx, carpool::Emitter& out) {
         const std::uint32_t first = next.fetch_add(ctx.budget);
         for (std::uint32_t id = first; id < std::min(count, first + ctx.budget); ++id) {
-          out.emit(fly, 0, Slab::born(id));
+          out.emit(enter, 0, Slab::born(id));
         }
         return first + ctx.budget < count ? carpool::SourceStatus::more
                                           : carpool::SourceStatus::exhausted;
       });
-  graph.add_edge(beam, fly);
-  graph.add_edge(fly, fly);
-  graph.add_edge(fly, collide);
-  graph.add_edge(collide, fly);
+  graph.add_edge(beam, enter);
+  for (const auto stage : next_stage) {
+    graph.add_edge(enter, stage);
+    graph.add_edge(collide, stage);
+  }
   const carpool::RunReport report = carpool::run(graph, {.threads = threads, .in_flight = 32768});
   if (print_report) {
     std::fputs(report.to_json().c_str(), stderr);
