@@ -6,7 +6,6 @@
 #include <thread>
 #include <vector>
 
-#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -103,21 +102,6 @@ TEST(ArenaTest, ManyShortRuns) {
     RandomGraph random({.seed = seed, .items = 40, .most_hops = 3});
     carpool::run(random.graph(), {.arena = &arena, .in_flight = 20});
     ASSERT_EQ(random.counted(), random.expected()) << seed;
-  }
-}
-
-// Each NUMA node, of which most machines have one, by an arena that the run makes.
-TEST(ArenaTest, ThreadsStayWhereConstraintsSay) {
-  for (const auto node : tbb::info::numa_nodes()) {
-    carpool::RunOptions options{.in_flight = 500};
-    options.constraints = tbb::task_arena::constraints(node);
-    RandomGraph random({.seed = 14, .items = 3000});
-    const auto report = carpool::run(random.graph(), options);
-    EXPECT_EQ(random.counted(), random.expected());
-    EXPECT_EQ(report.workers.size(),
-              static_cast<std::size_t>(tbb::info::default_concurrency(node)));
-    options.threads = 1;
-    EXPECT_EQ(carpool::worker_count(options), 1U);
   }
 }
 

@@ -12,6 +12,9 @@
 #include <span>
 #include <vector>
 
+#include <tbb/info.h>
+#include <tbb/task_arena.h>
+
 #include "carpool/carpool.h"
 
 using namespace std::chrono_literals;
