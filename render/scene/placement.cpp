@@ -101,7 +101,8 @@ class Placer {
         PlaceInstanced(instance);
       }
     }
-    Extend(g_.floats, 4);  // Embree loads 16 bytes at a vertex, also at the last one
+    Extend(g_.floats, 4);   // Embree and kernels load 16 bytes at a vertex, also at the last one
+    Extend(g_.indices, 1);  // kernels do so at a triangle
     return plan_;
   }
 

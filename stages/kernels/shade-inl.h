@@ -101,11 +101,12 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
   v.surface = MakeSurface(d, c, v.at, direction);
 
   v.cone_width = hn::MulAdd(v.cone_spread, v.distance, through.w);
-  v.footprint.uv = TextureCoordinates(d, c, v.at, hn::Zero(IntTag<D>()));
+  const TextureTriangle<D> uvs = GatherTextureTriangle(d, c, v.at, hn::Zero(di));
+  v.footprint.uv = TextureCoordinates<D>(v.at, uvs);
   // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter
   // takes care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and
   // blur).
-  const Real<D> density = SafeDiv(d, TwiceTextureArea(d, c, v.at), v.surface.twice_area);
+  const Real<D> density = SafeDiv(d, TwiceTextureArea<D>(uvs), v.surface.twice_area);
   const Real<D> least = Splat(d, 1e-30);  // a camera inside a surface, a shape without coordinates
   v.footprint.log2_width = hn::MulAdd(FastLog2(d, hn::Max(density, least)), Splat(d, 0.5),
                                       FastLog2(d, hn::Max(v.cone_width, least)));

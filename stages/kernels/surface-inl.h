@@ -52,16 +52,16 @@ struct Surface {
   Mask<D> back;  // the ray hit the side that glTF calls the back
 };
 
-/// Interpolates `size` <= 4 floats per vertex of one stream.
+/// The value at the point of what the vertices have.
 template <class D>
-HWY_INLINE Real<D> Interpolate(D d, const float* floats, const SurfacePoint<D>& at, Int<D> base,
-                               int stride, int component) {
-  const IntTag<D> di;
-  const auto vertex = [&](Int<D> i) HWY_ATTR {
-    return GatherReal(d, floats, base + i * hn::Set(di, stride) + hn::Set(di, component));
-  };
-  return hn::MulAdd(at.b0, vertex(at.index.i0),
-                    hn::MulAdd(at.b1, vertex(at.index.i1), at.b2 * vertex(at.index.i2)));
+HWY_INLINE Real<D> Interpolate(const SurfacePoint<D>& at, Real<D> v0, Real<D> v1, Real<D> v2) {
+  return hn::MulAdd(at.b0, v0, hn::MulAdd(at.b1, v1, at.b2 * v2));
+}
+template <class D>
+HWY_INLINE Vec3<D> Interpolate(const SurfacePoint<D>& at, const Vec3<D>& v0, const Vec3<D>& v1,
+                               const Vec3<D>& v2) {
+  return {Interpolate<D>(at, v0.x, v1.x, v2.x), Interpolate<D>(at, v0.y, v1.y, v2.y),
+          Interpolate<D>(at, v0.z, v1.z, v2.z)};
 }
 
 template <class D>
@@ -146,9 +146,10 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
   s.shading = s.geometric;
   if (!hn::AllFalse(d, smooth)) {
     const Int<D> base = hn::Max(normals, hn::Zero(IntTag<D>()));
-    Vec3<D> n = {Interpolate(d, c.geometry.floats, at, base, 3, 0),
-                 Interpolate(d, c.geometry.floats, at, base, 3, 1),
-                 Interpolate(d, c.geometry.floats, at, base, 3, 2)};
+    const auto vertex = [&](Int<D> i) HWY_ATTR {
+      return GatherTriple(d, c.geometry.floats, base + i * hn::Set(IntTag<D>(), 3));
+    };
+    Vec3<D> n = Interpolate<D>(at, vertex(at.index.i0), vertex(at.index.i1), vertex(at.index.i2));
     if (!hn::AllFalse(d, instanced)) {
       n = Select<D>(instanced, NormalToWorld(d, at.placement, n), n);
     }
@@ -159,46 +160,54 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
   return s;
 }
 
-/// Texture coordinates of one set; (0, 0) where the shape has no such set.
+/// A triangle's vertices in one set of texture coordinates; idle where the shape has no such set.
+template <class D>
+struct TextureTriangle {
+  Mask<D> present;
+  Vec2<D> v0, v1, v2;
+};
+template <class D>
+HWY_INLINE TextureTriangle<D> GatherTextureTriangle(D d, const KernelContext& c,
+                                                    const SurfacePoint<D>& at, Int<D> set) {
+  const IntTag<D> di;
+  const Int<D> uvs = FieldInt(d, at.placement, offsetof(Placement, uvs));
+  const Int<D> sets = FieldInt(d, at.placement, offsetof(Placement, uv_sets));
+  TextureTriangle<D> t;
+  t.present = hn::And(IsPresent(d, uvs), hn::RebindMask(d, hn::Lt(set, sets)));
+  if (hn::AllFalse(d, t.present)) {
+    const Vec2<D> zero = {hn::Zero(d), hn::Zero(d)};
+    t.v0 = t.v1 = t.v2 = zero;
+    return t;
+  }
+  const auto vertex = [&](Int<D> i) HWY_ATTR {
+    const Int<D> word = uvs + hn::ShiftLeft<1>(i * sets + set);
+    return GatherPair(d, c.geometry.floats,
+                      hn::IfThenElseZero(hn::RebindMask(di, t.present), word));
+  };
+  t.v0 = vertex(at.index.i0);
+  t.v1 = vertex(at.index.i1);
+  t.v2 = vertex(at.index.i2);
+  return t;
+}
+
+/// Texture coordinates of the point; (0, 0) where the shape has none.
+template <class D>
+HWY_INLINE Vec2<D> TextureCoordinates(const SurfacePoint<D>& at, const TextureTriangle<D>& t) {
+  return {hn::IfThenElseZero(t.present, Interpolate<D>(at, t.v0.x, t.v1.x, t.v2.x)),
+          hn::IfThenElseZero(t.present, Interpolate<D>(at, t.v0.y, t.v1.y, t.v2.y))};
+}
 template <class D>
 HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const SurfacePoint<D>& at,
                                       Int<D> set) {
-  const IntTag<D> di;
-  const Int<D> zero = hn::Zero(di);
-  const Int<D> uvs = FieldInt(d, at.placement, offsetof(Placement, uvs));
-  const Int<D> sets = FieldInt(d, at.placement, offsetof(Placement, uv_sets));
-  const Mask<D> present = hn::And(IsPresent(d, uvs), hn::RebindMask(d, hn::Lt(set, sets)));
-  if (hn::AllFalse(d, present)) return {hn::Zero(d), hn::Zero(d)};
-  const auto vertex = [&](Int<D> i, int component) HWY_ATTR {
-    const Int<D> word = uvs + (i * sets + set) * hn::Set(di, 2) + hn::Set(di, component);
-    return GatherReal(d, c.geometry.floats,
-                      hn::IfThenElse(hn::RebindMask(di, present), word, zero));
-  };
-  const auto mix = [&](int component) HWY_ATTR {
-    const Real<D> value = hn::MulAdd(
-        at.b0, vertex(at.index.i0, component),
-        hn::MulAdd(at.b1, vertex(at.index.i1, component), at.b2 * vertex(at.index.i2, component)));
-    return hn::IfThenElseZero(present, value);
-  };
-  return {mix(0), mix(1)};
+  return TextureCoordinates<D>(at, GatherTextureTriangle(d, c, at, set));
 }
 
-/// Twice the triangle's area in the first set of texture coordinates.
+/// Twice the triangle's area in texture coordinates.
 template <class D>
-HWY_INLINE Real<D> TwiceTextureArea(D d, const KernelContext& c, const SurfacePoint<D>& at) {
-  const IntTag<D> di;
-  const Int<D> uvs = FieldInt(d, at.placement, offsetof(Placement, uvs));
-  const Int<D> sets = FieldInt(d, at.placement, offsetof(Placement, uv_sets));
-  const Mask<D> present = IsPresent(d, uvs);
-  const auto vertex = [&](Int<D> i, int component) HWY_ATTR {
-    const Int<D> word = uvs + i * sets * hn::Set(di, 2) + hn::Set(di, component);
-    return GatherReal(d, c.geometry.floats,
-                      hn::IfThenElse(hn::RebindMask(di, present), word, hn::Zero(di)));
-  };
-  const Real<D> u0 = vertex(at.index.i0, 0), v0 = vertex(at.index.i0, 1);
-  const Real<D> u1 = vertex(at.index.i1, 0) - u0, v1 = vertex(at.index.i1, 1) - v0;
-  const Real<D> u2 = vertex(at.index.i2, 0) - u0, v2 = vertex(at.index.i2, 1) - v0;
-  return hn::IfThenElseZero(present, hn::Abs(DifferenceOfProducts(u1, v2, u2, v1)));
+HWY_INLINE Real<D> TwiceTextureArea(const TextureTriangle<D>& t) {
+  const Vec2<D> a = {t.v1.x - t.v0.x, t.v1.y - t.v0.y};
+  const Vec2<D> b = {t.v2.x - t.v0.x, t.v2.y - t.v0.y};
+  return hn::IfThenElseZero(t.present, hn::Abs(DifferenceOfProducts(a.x, b.y, b.x, a.y)));
 }
 
 /// Where textures are read: coordinates of the first set and what the ray cone covers there.
@@ -250,12 +259,16 @@ HWY_INLINE Rgba<D> BaseColor(D d, const KernelContext& c, const SurfacePoint<D>&
   const Mask<D> colored = hn::And(active, IsPresent(d, colors));
   if (!hn::AllFalse(d, colored)) {
     const Int<D> base = hn::Max(colors, hn::Zero(IntTag<D>()));
-    const auto channel = [&](int i) HWY_ATTR {
-      const Real<D> value = Interpolate(d, c.geometry.floats, at, base, 4, i);
-      return hn::IfThenElse(colored, value, Splat(d, 1));
+    const auto vertex = [&](Int<D> i) HWY_ATTR {
+      return GatherQuad(d, c.geometry.floats, base + hn::ShiftLeft<2>(i));
     };
-    color.rgb = Mul<D>(color.rgb, {channel(0), channel(1), channel(2)});
-    color.a = color.a * channel(3);
+    const Quad<D> q0 = vertex(at.index.i0), q1 = vertex(at.index.i1), q2 = vertex(at.index.i2);
+    const auto channel = [&](Real<D> v0, Real<D> v1, Real<D> v2) HWY_ATTR {
+      return hn::IfThenElse(colored, Interpolate<D>(at, v0, v1, v2), Splat(d, 1));
+    };
+    color.rgb = Mul<D>(color.rgb, {channel(q0.x, q1.x, q2.x), channel(q0.y, q1.y, q2.y),
+                                   channel(q0.z, q1.z, q2.z)});
+    color.a = color.a * channel(q0.w, q1.w, q2.w);
   }
   return color;
 }
@@ -311,11 +324,13 @@ HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<
   const Real<D> z = expand(texel.rgb.z);
 
   const Int<D> base = hn::Max(tangents, hn::Zero(di));
-  Vec3<D> tangent = {Interpolate(d, c.geometry.floats, at, base, 4, 0),
-                     Interpolate(d, c.geometry.floats, at, base, 4, 1),
-                     Interpolate(d, c.geometry.floats, at, base, 4, 2)};
-  Real<D> handedness =
-      GatherReal(d, c.geometry.floats, base + at.index.i0 * hn::Set(di, 4) + hn::Set(di, 3));
+  const auto vertex = [&](Int<D> i) HWY_ATTR {
+    return GatherQuad(d, c.geometry.floats, base + hn::ShiftLeft<2>(i));
+  };
+  const Quad<D> t0 = vertex(at.index.i0), t1 = vertex(at.index.i1), t2 = vertex(at.index.i2);
+  Vec3<D> tangent = {Interpolate<D>(at, t0.x, t1.x, t2.x), Interpolate<D>(at, t0.y, t1.y, t2.y),
+                     Interpolate<D>(at, t0.z, t1.z, t2.z)};
+  Real<D> handedness = t0.w;
   const Mask<D> instanced = PlacementHas(d, at.placement, kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
     tangent = Select<D>(instanced, VectorToWorld(d, at.placement, tangent), tangent);

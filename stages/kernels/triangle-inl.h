@@ -38,8 +38,9 @@ HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& vie
   const IntTag<D> di;
   const Int<D> first =
       FieldInt(d, placement, offsetof(Placement, first_index)) + primitive * hn::Set(di, 3);
-  return {GatherInt(d, view.indices, first), GatherInt(d, view.indices, first + hn::Set(di, 1)),
-          GatherInt(d, view.indices, first + hn::Set(di, 2))};
+  // As the bits of floats, which only travel.
+  const Vec3<D> bits = GatherTriple(d, reinterpret_cast<const float*>(view.indices), first);
+  return {hn::BitCast(di, bits.x), hn::BitCast(di, bits.y), hn::BitCast(di, bits.z)};
 }
 
 /// The rows of a 3x4 matrix.
@@ -68,7 +69,7 @@ HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view,
   const IntTag<D> di;
   const Int<D> base = FieldInt(d, placement, offsetof(Placement, positions));
   const auto vertex = [&](Int<D> i) HWY_ATTR {
-    return GatherVec3(d, view.floats, base + i * hn::Set(di, 3));
+    return GatherTriple(d, view.floats, base + i * hn::Set(di, 3));
   };
   Vec3<D> p0 = vertex(index.i0), p1 = vertex(index.i1), p2 = vertex(index.i2);
 

@@ -60,6 +60,28 @@ HWY_INLINE Quad<D> GatherQuad(D d, const float* HWY_RESTRICT base, Int<D> index)
   }
 }
 
+/// base[index], base[index + 1], base[index + 2]. Reads one float more where lanes are four or
+/// more.
+template <class D>
+HWY_INLINE Vec3<D> GatherTriple(D d, const float* HWY_RESTRICT base, Int<D> index) {
+  if constexpr (hn::MaxLanes(D()) < 4) {
+    return GatherVec3(d, base, index);
+  } else {
+    const Quad<D> q = GatherQuad(d, base, index);
+    return {q.x, q.y, q.z};
+  }
+}
+/// base[index], base[index + 1]. Reads two floats more where lanes are four or more.
+template <class D>
+HWY_INLINE Vec2<D> GatherPair(D d, const float* HWY_RESTRICT base, Int<D> index) {
+  if constexpr (hn::MaxLanes(D()) < 4) {
+    return {GatherReal(d, base, index), GatherReal(d, base, index + hn::Set(IntTag<D>(), 1))};
+  } else {
+    const Quad<D> q = GatherQuad(d, base, index);
+    return {q.x, q.y};
+  }
+}
+
 /// The four floats from byte `offset` of record `index` in an array of `Record`s.
 template <class Record, class D>
 HWY_INLINE Quad<D> FieldQuad(D d, const Record* HWY_RESTRICT base, Int<D> index, size_t offset) {

@@ -46,6 +46,8 @@ struct LightScene {
   }
   void Build() {
     scene.geometry.placements.resize(1);
+    scene.geometry.floats.resize(scene.geometry.floats.size() + 4);  // kernels load 16 bytes
+    scene.geometry.indices.resize(scene.geometry.indices.size() + 1);
     render::BuildLightTree(scene, triangles, punctual);
     view = LightViewOf(scene);
   }
