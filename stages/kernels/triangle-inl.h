@@ -38,9 +38,14 @@ HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& vie
   const IntTag<D> di;
   const Int<D> first =
       FieldInt(d, placement, offsetof(Placement, first_index)) + primitive * hn::Set(di, 3);
-  // As the bits of floats, which only travel.
-  const Vec3<D> bits = GatherTriple(d, reinterpret_cast<const float*>(view.indices), first);
-  return {hn::BitCast(di, bits.x), hn::BitCast(di, bits.y), hn::BitCast(di, bits.z)};
+  if constexpr (hn::MaxLanes(D()) < 4) {
+    return {GatherInt(d, view.indices, first), GatherInt(d, view.indices, first + hn::Set(di, 1)),
+            GatherInt(d, view.indices, first + hn::Set(di, 2))};
+  } else {
+    // As the bits of floats, which only travel.
+    const Vec3<D> bits = GatherTriple(d, reinterpret_cast<const float*>(view.indices), first);
+    return {hn::BitCast(di, bits.x), hn::BitCast(di, bits.y), hn::BitCast(di, bits.z)};
+  }
 }
 
 /// The rows of a 3x4 matrix.
