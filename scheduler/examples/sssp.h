@@ -89,13 +89,9 @@ inline std::vector<std::uint32_t> delta_stepping(const Grid& grid, std::uint32_t
   for (auto& value : distance) {
     value.store(kFar, std::memory_order_relaxed);
   }
-  std::atomic<std::uint32_t> nearest{
-      0};  // about where the search is: a hint for the order, no more
-
   carpool::Graph graph;
   const auto relax = graph.add_stage<Visit>({.name = "relax", .bins = kBuckets});
   graph.set_kernel(relax, [&](const carpool::Batch<Visit>& batch, carpool::Emitter& out) {
-    nearest.store(batch.items.front().distance / delta, std::memory_order_relaxed);
     for (const Visit& visit : batch.items) {
       if (visit.distance != distance[visit.vertex].load(std::memory_order_relaxed)) {
         continue;  // a shorter way has been found meanwhile
@@ -117,14 +113,12 @@ inline std::vector<std::uint32_t> delta_stepping(const Grid& grid, std::uint32_t
   graph.add_edge(start, relax);
   graph.add_edge(relax, relax);
 
-  const auto nearest_bucket =
-      carpool::Policy::custom("nearest bucket", kBuckets, [&](const carpool::BlockInfo& block) {
-        return (block.bin - nearest.load(std::memory_order_relaxed) + kBuckets / 2) % kBuckets;
-      });
-  // One start becomes a whole front, whose size nobody knows beforehand: let the memory grow with
-  // it.
-  carpool::run(graph,
-               {.threads = threads, .policy = nearest_bucket, .overflow = carpool::Overflow::grow});
+  // The nearest bucket first, full or not: whoever runs ahead finds ways that are no shortest ones,
+  // and has to do it all again. One start becomes a whole front, whose size nobody knows
+  // beforehand: let the memory grow with it.
+  carpool::run(graph, {.threads = threads,
+                       .policy = carpool::Policy::bins_in_ring(),
+                       .overflow = carpool::Overflow::grow});
   return {distance.begin(), distance.end()};
 }
 

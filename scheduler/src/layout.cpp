@@ -44,6 +44,11 @@ Layout::Layout(const Graph& graph, const RunOptions& options, std::uint32_t work
   switch (options.policy.kind()) {
     case Policy::Kind::deepest_first:
       break;  // order_by_rank has set it
+    case Policy::Kind::bins_in_order:
+      for (const auto& stage : graph.stages()) {
+        lanes = std::max(lanes, stage.options.bins);
+      }
+      break;
     case Policy::Kind::fullest_first:
     case Policy::Kind::oldest_first:
     case Policy::Kind::custom:

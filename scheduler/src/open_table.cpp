@@ -145,6 +145,9 @@ std::uint32_t OpenTable::choose() {
   if (policy_.kind() == Policy::Kind::custom) {
     return choose_by_lane_function();
   }
+  if (policy_.kind() == Policy::Kind::bins_in_order) {
+    return nearest(first_bin_, layout_.lanes).bit;
+  }
   if (policy_.kind() == Policy::Kind::oldest_first) {
     const std::uint32_t slot = oldest_;
     for (const StageLayout& stage : layout_.stages) {
@@ -194,6 +197,31 @@ std::uint32_t OpenTable::choose_by_lane_function() {
     } while (bit != begin && ++seen < kCandidates);
   }
   cursor_ = best + 1;
+  return best;
+}
+
+OpenTable::Nearest OpenTable::nearest(std::uint32_t begin, std::uint32_t ring) const {
+  Nearest best;
+  if (count() == 0) {
+    return best;
+  }
+  for (const StageLayout& stage : layout_.stages) {
+    const auto has = [&](std::uint32_t bit) {
+      return bit >= stage.first_bit && bit - stage.first_bit < stage.bins;
+    };
+    for (std::uint32_t grades = grades_in_use_; grades != 0; grades &= grades - 1) {
+      const Bitmap& bits = grades_[static_cast<std::uint32_t>(std::countr_zero(grades))];
+      std::uint32_t bit =
+          begin < stage.bins ? bits.first_from(stage.first_bit + begin) : Bitmap::kNone;
+      bit = has(bit) ? bit : bits.first_from(stage.first_bit);
+      if (!has(bit)) {
+        continue;
+      }
+      const std::uint32_t bin = bit - stage.first_bit;
+      const std::uint32_t distance = bin >= begin ? bin - begin : bin + ring - begin;
+      best = distance < best.distance ? Nearest{bit, distance} : best;
+    }
+  }
   return best;
 }
 

@@ -56,6 +56,18 @@ class OpenTable final : public Emitter {
   // take_best removes the block that should leave first. False if there is none.
   bool take_best(Block& block);
 
+  // nearest returns the bit of the block whose bin comes first, counted from `begin` round a ring
+  // of `ring` bins, and how far that is; Bitmap::kNone if there is none. take() removes it.
+  struct Nearest {
+    std::uint32_t bit = Bitmap::kNone;
+    std::uint32_t distance = ~0U;
+  };
+  Nearest nearest(std::uint32_t begin, std::uint32_t ring) const;
+  Block take(std::uint32_t bit) { return remove(bit); }
+
+  // begin_at says where bins in order begin: see nearest().
+  void begin_at(std::uint32_t bin) { first_bin_ = bin; }
+
   // take_fullest removes the fullest block of one stage. False if it has none.
   bool take_fullest(std::uint32_t stage, Block& block);
 
@@ -129,7 +141,8 @@ class OpenTable final : public Emitter {
   std::uint32_t oldest_ = Bitmap::kNone;
   std::uint32_t newest_ = Bitmap::kNone;
   std::uint32_t cursor_ = 0;
-  Counter count_;  // others may look at it
+  std::uint32_t first_bin_ = 0;  // where bins in order begin
+  Counter count_;                // others may look at it
   std::uint64_t now_ = 0;
 };
 

@@ -25,6 +25,16 @@ Policy Policy::oldest_first() {
   return {Kind::oldest_first, "oldest-first", 1, {}};
 }
 
+Policy Policy::bins_in_order() {
+  return {Kind::bins_in_order, "bins in order", 0, {}};
+}
+
+Policy Policy::bins_in_ring() {
+  Policy policy{Kind::bins_in_order, "bins in a ring", 0, {}};
+  policy.ring_ = true;
+  return policy;
+}
+
 Policy Policy::custom(std::string name, std::uint32_t lanes, LaneFunction lane_of) {
   if (lanes == 0 || lanes > kMostLanes || !lane_of) {
     throw std::invalid_argument("carpool: policy '" + name +

@@ -43,8 +43,21 @@ ReadyBlock* ReadyQueue::take(bool newest, std::uint32_t end) {
     return nullptr;  // only the owner, who is asking, could have added one
   }
   const std::lock_guard guard(lock_);
-  const std::uint32_t lane = used_.first();
+  const std::uint32_t lane = first_lane();
   return lane >= end ? nullptr : unlink(lane, newest);  // Bitmap::kNone is above all
+}
+
+void ReadyQueue::begin_at(std::uint32_t lane) {
+  const std::lock_guard guard(lock_);
+  begin_ = lane;
+}
+
+std::uint32_t ReadyQueue::best_lane() {
+  if (size() == 0) {
+    return Bitmap::kNone;
+  }
+  const std::lock_guard guard(lock_);
+  return first_lane();
 }
 
 ReadyBlock* ReadyQueue::steal(std::uint32_t items) {
@@ -57,7 +70,7 @@ ReadyBlock* ReadyQueue::steal(std::uint32_t items) {
   ReadyBlock** tail = &list;
   std::uint32_t taken = 0;
   do {
-    const std::uint32_t lane = used_.first();
+    const std::uint32_t lane = first_lane();
     if (lane == Bitmap::kNone) {
       break;
     }

@@ -29,6 +29,14 @@ class ReadyQueue {
   // null.
   ReadyBlock* take(bool newest, std::uint32_t end);
 
+  // begin_at says from which lane on, and round to it, lanes are looked through: a ring. For the
+  // owner.
+  void begin_at(std::uint32_t lane);
+
+  // best_lane returns the lane that take() would look into first, or Bitmap::kNone. For the owner;
+  // thieves may be quicker.
+  std::uint32_t best_lane();
+
   // steal takes the best block, the oldest of its lane, and more of them while they are tiny: up to
   // `items` items or half of the queue. Returns a list linked by `newer`, or null if there is
   // nothing or the lock is taken.
@@ -49,10 +57,14 @@ class ReadyQueue {
     ReadyBlock* oldest = nullptr;
   };
   ReadyBlock* unlink(std::uint32_t lane, bool newest);
+  std::uint32_t first_lane() const {
+    return begin_ == 0 ? used_.first() : used_.first_from(begin_);
+  }
 
   SpinLock lock_;
   std::vector<Lane> heads_;
   Bitmap used_;
+  std::uint32_t begin_ = 0;
   std::atomic<std::uint32_t> partials_{0};
   std::atomic<std::uint32_t>& size_;
 };

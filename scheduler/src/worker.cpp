@@ -35,6 +35,8 @@ Worker::Worker(RunCore& core, std::uint32_t index)
       exchange_(core.exchange.get()),
       index_(index),
       newest_first_(core.options.policy.kind() == Policy::Kind::deepest_first),
+      in_order_(core.options.policy.kind() == Policy::Kind::bins_in_order),
+      half_(core.options.policy.ring() ? core.layout.lanes / 2 : 0),
       plain_(exchange_ == nullptr && !core.spill && !core.options.monitor.watches()),
       has_chores_(core.options.progress || core.linger_ticks != 0 ||
                   core.layout.blocking_threads != 0 || core.trace() != nullptr),
@@ -109,9 +111,63 @@ RunState::Worker Worker::state() const {
 // then what others have ready; then partial blocks, last of all those that have been offered to
 // others, who need time to come; and new items once more, one by one if need be.
 bool Worker::acquire(Work& work) {
+  if (in_order_) {
+    return acquire_in_order(work);
+  }
   return take_ready(work, offers_stand() ? layout_.lanes : layout_.ready_lanes()) ||
          (!plain_ && take_from_outside(work)) || take_source(work, false) || steal(work) ||
          take_open(work) || take_ready(work, layout_.ready_lanes()) || take_source(work, true);
+}
+
+// Where bins are in order, the nearest block comes before what others have, full or not.
+bool Worker::acquire_in_order(Work& work) {
+  const bool found = take_source(work, false) || (!plain_ && take_from_outside(work)) ||
+                     take_nearest(work) || steal(work) || take_source(work, true);
+  if (found && !work.is_source) {
+    move_on_to(work.block.bin);
+  }
+  return found;
+}
+
+bool Worker::take_nearest(Work& work) {
+  for (;;) {
+    const OpenTable::Nearest open = runner_.open().nearest(begin_, layout_.lanes);
+    const std::uint32_t lane = ready_.best_lane();
+    const bool is_ready = lane != Bitmap::kNone;
+    const std::uint32_t distance = lane >= begin_ ? lane - begin_ : lane + layout_.lanes - begin_;
+    if (is_ready && distance <= open.distance) {
+      if (take_ready(work, layout_.ready_lanes())) {
+        return true;
+      }
+      continue;  // a thief was quicker
+    }
+    if (open.bit == Bitmap::kNone) {
+      return false;
+    }
+    work.block = runner_.open().take(open.bit);
+    work.cause = FlushCause::idle;
+    work.is_source = work.stolen = false;
+    if (plain_) {
+      return true;
+    }
+    runner_.stats().stages[work.block.stage].published.add(work.block.items);
+    if (leaves_freely(work.block, work.cause)) {
+      return true;
+    }
+  }
+}
+
+// On a ring, the order of a worker goes with it.
+void Worker::move_on_to(std::uint32_t bin) {
+  if (half_ == 0) {
+    return;
+  }
+  const std::uint32_t begin = bin >= half_ ? bin - half_ : bin + layout_.lanes - half_;
+  if (begin != begin_) {
+    begin_ = begin;
+    ready_.begin_at(begin);
+    runner_.open().begin_at(begin);
+  }
 }
 
 // An offer stands for a while, and longer if somebody is on the way. Not for ever: an arena may be
@@ -385,7 +441,7 @@ void Worker::push_ready(const Block& block, FlushCause cause) {
   ready->partial = cause != FlushCause::full && cause != FlushCause::count;
   // Full blocks before partial ones. A block that has lingered counts as full: it has waited
   // enough.
-  ready->lane = lane_of(block) + (cause == FlushCause::asked ? layout_.lanes : 0);
+  ready->lane = lane_of(block) + (cause == FlushCause::asked && !in_order_ ? layout_.lanes : 0);
   ready_.push(ready);
   if (gate_.hungry(gate_.view())) {
     core_.invite();
@@ -404,6 +460,8 @@ std::uint32_t Worker::lane_of(const Block& block) const {
     }
     case Policy::Kind::oldest_first:
       return 0;
+    case Policy::Kind::bins_in_order:
+      return block.bin;
     case Policy::Kind::custom:
       break;
   }

@@ -53,6 +53,9 @@ class Worker final : private BlockSink {
   bool acquire(Work& work);
   bool offers_stand() const;
   bool take_ready(Work& work, std::uint32_t end_lane);
+  bool acquire_in_order(Work& work);
+  bool take_nearest(Work& work);
+  void move_on_to(std::uint32_t bin);
   bool take_source(Work& work, bool last_resort);
   bool steal(Work& work);
   bool take_open(Work& work);
@@ -85,8 +88,11 @@ class Worker final : private BlockSink {
   Exchange* const exchange_;  // null if no stage needs one
   const std::uint32_t index_;
   const bool newest_first_;
-  const bool plain_;       // a block that leaves the open table needs no more thought
-  const bool has_chores_;  // is there anything to do between batches?
+  const bool in_order_;       // bins are in order ...
+  const std::uint32_t half_;  // ... on a ring, of which this is half; 0: on a line
+  std::uint32_t begin_ = 0;   // the bin where this worker's order begins
+  const bool plain_;          // a block that leaves the open table needs no more thought
+  const bool has_chores_;     // is there anything to do between batches?
   BatchRunner runner_;
   ReadyQueue ready_;
 

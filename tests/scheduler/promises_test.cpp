@@ -86,6 +86,49 @@ TEST(PolicyTest, FullestFirstTakesTheLongestBatch) {
   EXPECT_EQ(lengths, (std::vector<std::size_t>{100, 20, 5, 1}));
 }
 
+// The bins in which batches ran, of a stage that was given some items for each of `bins` and whose
+// kernel emits one more item, two bins on, for each batch until bin `last`.
+std::vector<std::uint32_t> bins_of(carpool::Policy policy, const std::vector<std::uint32_t>& bins,
+                                   std::uint32_t ring, std::uint32_t last) {
+  carpool::Graph graph;
+  const auto stage = graph.add_stage<std::uint32_t>({.name = "s", .bins = ring, .block_items = 4});
+  std::vector<std::uint32_t> seen;
+  graph.set_kernel(stage, [&](const Batch<std::uint32_t>& batch, Emitter& out) {
+    seen.push_back(batch.items.front());
+    if (seen.back() + 2 <= last) {
+      out.emit(stage, (seen.back() + 2) % ring, seen.back() + 2);
+    }
+  });
+  graph.add_source({.name = "once"}, [&](SourceContext&, Emitter& out) {
+    for (std::size_t i = 0; i < bins.size(); ++i) {
+      for (std::size_t k = 0; k < 1 + 4 * (i % 2); ++k) {  // every second one has a full block
+        out.emit(stage, bins[i] % ring, bins[i]);
+      }
+    }
+    return SourceStatus::exhausted;
+  });
+  carpool::run(graph, serial(std::move(policy)));
+  return seen;
+}
+
+TEST(PolicyTest, BinsInOrderTakesTheLowestFullOrNot) {
+  using Bins = std::vector<std::uint32_t>;
+  // Bin 9 has a full block and one more item, bins 3 and 12 one item each.
+  EXPECT_EQ(bins_of(carpool::Policy::bins_in_order(), {12, 9, 3}, 16, 0), (Bins{3, 9, 9, 12}));
+  EXPECT_EQ(bins_of(carpool::Policy::bins_in_order(), {12, 9, 3}, 16, 8),
+            (Bins{3, 5, 7, 9, 9, 12}));
+}
+
+TEST(PolicyTest, BinsInARingGoOnPastTheEnd) {
+  // Two sequences that go three times round a ring of 8, the second a bin ahead; it begins with a
+  // full block and one more item.
+  std::vector<std::uint32_t> expected = {0, 1};
+  for (std::uint32_t bin = 1; bin <= 24; ++bin) {
+    expected.push_back(bin);
+  }
+  EXPECT_EQ(bins_of(carpool::Policy::bins_in_ring(), {0, 1}, 8, 24), expected);
+}
+
 TEST(PolicyTest, BadOnesAreRefused) {
   EXPECT_THROW(carpool::Policy::custom("x", 0, [](const carpool::BlockInfo&) { return 0U; }),
                std::invalid_argument);

@@ -15,6 +15,14 @@ carpool::Policy random_policy(std::uint64_t dice) {
     case 2:
       return carpool::Policy::oldest_first();
     default:
+      break;
+  }
+  switch (dice / 4 % 3) {
+    case 0:
+      return carpool::Policy::bins_in_order();
+    case 1:
+      return carpool::Policy::bins_in_ring();
+    default:
       return carpool::Policy::custom("by bin", 32, [](const carpool::BlockInfo& block) {
         return block.bin % 40;  // some lanes are too high, which must not matter
       });

@@ -16,14 +16,14 @@ struct BlockInfo {
   int rank = 0;                ///< The stage's rank.
 };
 
-/// Policy orders ready blocks. Full blocks come before partial ones, whatever the policy; it
-/// decides among each.
+/// Policy orders blocks. Full blocks come before partial ones, and it decides among each; except
+/// where bins are in order, which full and partial blocks keep alike.
 ///
 /// A policy is a preference of each worker among the blocks it has, not a promise about the whole
 /// run: other workers take what they have at the same time.
 class Policy {
  public:
-  enum class Kind { deepest_first, fullest_first, oldest_first, custom };
+  enum class Kind { deepest_first, fullest_first, oldest_first, bins_in_order, custom };
 
   /// Chooses a lane for a block: lane 0 is taken first. Called once when a block is published, and
   /// for up to 16 candidates when a worker has only partial blocks left. Called from all workers at
@@ -40,13 +40,24 @@ class Policy {
   /// oldest_first takes blocks in the order in which they were opened, which is the fairest.
   static Policy oldest_first();
 
+  /// bins_in_order takes the lowest bin first, of whatever stage, even if its block is not full and
+  /// others are: for algorithms that do much more work when they run ahead, such as
+  /// label-correcting searches. Batches become shorter for it.
+  static Policy bins_in_order();
+
+  /// bins_in_ring does the same on a ring of bins, as many as the stage with the most has: for a
+  /// sequence without end. A worker that took bin b last takes first what is up to half a ring
+  /// before b, then b, then what is behind it.
+  static Policy bins_in_ring();
+
   /// custom takes blocks by your own lane function; the oldest first within a lane. `lanes` is at
   /// most 65,536.
   static Policy custom(std::string name, std::uint32_t lanes, LaneFunction lane_of);
 
   Kind kind() const { return kind_; }
   const std::string& name() const { return name_; }
-  std::uint32_t lanes() const { return lanes_; }
+  std::uint32_t lanes() const { return lanes_; }  ///< Of bins in order: 0, a lane per bin.
+  bool ring() const { return ring_; }
   const LaneFunction& lane_function() const { return lane_of_; }
 
  private:
@@ -56,6 +67,7 @@ class Policy {
   std::string name_;
   std::uint32_t lanes_;
   LaneFunction lane_of_;
+  bool ring_ = false;
 };
 
 }  // namespace carpool
