@@ -23,19 +23,27 @@ enum class Mutant {
   shifted_texel,   // texel centres at whole numbers
   float_film,      // sums in single precision
   epsilon_offset,  // ray origins moved by a fixed distance
+  naive_uniform,   // all 31 bits of a random word, which round up to 1
+  naive_ggx,       // D(h) from 1 - cos^2
+  shifted_sky,     // the environment's texel centres at whole numbers, for looking up alone
+  rejected_nan,    // samples that are not finite vanish without a word
 };
 
 #ifdef CARPOOL_MUTANTS
 
 inline Mutant MutantFromEnvironment() {
-  constexpr std::array<std::pair<std::string_view, Mutant>, 7> kNames{
+  constexpr std::array<std::pair<std::string_view, Mutant>, 11> kNames{
       {{"none", Mutant::none},
        {"large_pdf", Mutant::large_pdf},
        {"missing_cosine", Mutant::missing_cosine},
        {"swapped_mis", Mutant::swapped_mis},
        {"shifted_texel", Mutant::shifted_texel},
        {"float_film", Mutant::float_film},
-       {"epsilon_offset", Mutant::epsilon_offset}}};
+       {"epsilon_offset", Mutant::epsilon_offset},
+       {"naive_uniform", Mutant::naive_uniform},
+       {"naive_ggx", Mutant::naive_ggx},
+       {"shifted_sky", Mutant::shifted_sky},
+       {"rejected_nan", Mutant::rejected_nan}}};
   const char* const wanted = std::getenv("CARPOOL_MUTANT");
   if (wanted == nullptr) return Mutant::none;
   for (const auto& [name, mutant] : kNames) {

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <sstream>
 
 #include "render/film/resolve.h"
 #include "render/posix/atomic_file.h"
+#include "render/posix/trap_guard.h"
+#include "render/session/near_walls.h"
 #include "render/session/output.h"
 #include "render/session/workspace.h"
 
@@ -108,6 +111,7 @@ class PassLoop {
     stopped_ = report.stopped;
     summary_.rays += report.rays;
     summary_.schedule = report.schedule;
+    summary_.comparison += report.comparison;
     summary_.state_bytes = std::max(summary_.state_bytes, report.state_bytes);
     summary_.queue_bytes = std::max<uint64_t>(summary_.queue_bytes, report.schedule.peak_bytes);
     if (stopped_ || !completes_samples) return;
@@ -166,7 +170,7 @@ void Describe(const Workspace& w, const RenderSettings& settings, RenderSummary&
   summary.eye = w.scene().tables.origin;
   summary.environment = w.scene().environment_name;
   summary.executor_reason = w.plan().executor_reason;
-  summary.isa = w.kernels().isa;
+  summary.isa = settings.executor == Executor::reference ? "double" : w.kernels().isa;
   summary.width = w.scene().width;
   summary.height = w.scene().height;
   summary.seed = settings.seed;
@@ -210,7 +214,11 @@ RenderSummary Render(const RenderSettings& settings, const std::atomic<bool>& st
     summary.load_seconds = SecondsSince(begin);
     phase(ProgressPhase::bvh);
     Workspace workspace(std::move(scene), settings, threads);
+    WarnOfWallsNearLights(workspace.scene(), workspace.bvh().View(), warn);
     Describe(workspace, settings, summary);
+    std::optional<TrapGuard> traps;
+    if (settings.executor == Executor::reference)
+      traps.emplace(static_cast<uint32_t>(workspace.scene().width));
     PassLoop(workspace, settings, stop, progress, begin, summary).Run();
     summary.executor = workspace.executor().name();
     if (const std::string why = workspace.executor().Why(); !why.empty())

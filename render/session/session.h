@@ -30,7 +30,8 @@ struct RenderSummary {
   double load_seconds = 0, bvh_seconds = 0, render_seconds = 0, save_seconds = 0;
   double first_preview_seconds = -1;  // after the end of the BVH build
   uint64_t film_bytes = 0, bvh_bytes = 0, state_bytes = 0, queue_bytes = 0;
-  RunReport schedule;  // of the last pass; empty for executors without a graph
+  stages::PathComparison comparison;  // of the reference executor; empty for the others
+  RunReport schedule;                 // of the last pass; empty for executors without a graph
 
   std::string Text() const;
   std::string Json() const;

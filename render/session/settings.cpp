@@ -13,9 +13,10 @@ namespace {
 template <class T, std::size_t N>
 using NameTable = std::array<std::pair<std::string_view, T>, N>;
 
-constexpr NameTable<Executor, 3> kExecutors{{{"auto", Executor::automatic},
+constexpr NameTable<Executor, 4> kExecutors{{{"auto", Executor::automatic},
                                              {"wavefront", Executor::wavefront},
-                                             {"megakernel", Executor::megakernel}}};
+                                             {"megakernel", Executor::megakernel},
+                                             {"reference", Executor::reference}}};
 constexpr NameTable<Policy, 3> kPolicies{
     {{"deepest", Policy::deepest}, {"fullest", Policy::fullest}, {"oldest", Policy::oldest}}};
 constexpr NameTable<Isa, 4> kIsas{
@@ -87,8 +88,10 @@ void CheckPaths(const RenderSettings& s) {
   if (!s.preview_path.empty() && !EndsWith(s.preview_path, ".png")) {
     Refuse("--preview: '" + s.preview_path + "' must end in .png");
   }
-  if (!s.trace_path.empty() && s.executor == Executor::megakernel) {
-    Refuse("--trace: the megakernel has no stages to show; use --executor wavefront");
+  if (!s.trace_path.empty() &&
+      (s.executor == Executor::megakernel || s.executor == Executor::reference)) {
+    Refuse("--trace: the " + std::string(Name(s.executor)) +
+           " has no stages to show; use --executor wavefront");
   }
 }
 

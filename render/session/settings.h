@@ -8,9 +8,9 @@
 
 namespace carpool::render {
 
-/// Who drives the kernels. The image is the same bytes either way; `automatic` takes the faster for
-/// the scene.
-enum class Executor { automatic, wavefront, megakernel };
+/// Who drives the kernels. The image of wavefront and megakernel is the same bytes; `automatic`
+/// takes the faster for the scene. `reference` renders in double and compares float with it.
+enum class Executor { automatic, wavefront, megakernel, reference };
 
 /// Which batch the scheduler takes next among the full ones.
 enum class Policy { deepest, fullest, oldest };

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "render/session/comparison.h"
 #include "render/session/ledger.h"
 #include "render/session/session.h"
 #include "render/session/version.h"
@@ -62,6 +63,7 @@ std::string RenderSummary::Text() const {
                 Mebibytes(bvh_bytes), Mebibytes(film_bytes), Mebibytes(state_bytes + queue_bytes));
   if (!schedule.stages.empty())
     out << Format("  scheduler: %.2f %% of worker time\n", 100 * SchedulerShare(schedule));
+  if (comparison.paths > 0) out << ComparisonText(*this);
   if (ledger.Count() > 0) out << "  samples: " << LedgerText(*this) << "\n";
   return out.str();
 }
@@ -95,6 +97,7 @@ std::string RenderSummary::Json() const {
         {"film", film_bytes},
         {"path_state", state_bytes},
         {"queues", queue_bytes}}}};
+  if (comparison.paths > 0) json["comparison"] = ComparisonJson(*this);
   if (!schedule.stages.empty())
     json["last_pass"] = nlohmann::ordered_json::parse(schedule.to_json());
   return json.dump(2) + "\n";

@@ -135,6 +135,8 @@ Workspace::Workspace(PreparedScene scene, const RenderSettings& settings, Thread
 
 std::unique_ptr<stages::Executor> Workspace::MakeExecutor(
     const stages::ExecutorOptions& options) const {
+  if (plan_.executor == Executor::reference)
+    return stages::MakeReference(context_, kernels_, options);
   std::vector<std::unique_ptr<stages::Executor>> candidates;
   if (plan_.executor != Executor::megakernel) {
     candidates.push_back(

@@ -14,6 +14,7 @@
 
 #include "carpool/carpool.h"
 #include "stages/executors/camera_work.h"
+#include "stages/executors/path_comparison.h"
 #include "stages/kernels/kernels.h"
 
 namespace carpool::stages {
@@ -45,12 +46,13 @@ struct ExecutorOptions {
 struct PassReport {
   RayCounts rays;
   double seconds = 0;
-  bool stopped = false;      // ended early: samples of some pixels of this pass are missing
-  RunReport schedule;        // of the stage graph; empty for executors without one
-  uint64_t state_bytes = 0;  // path state
-  double run_length = 1;     // items per call of the shading kernel
-  double seats_filled = 0;   // SIMD lanes used while shading / lanes of the instruction set, 0..1
-  double idle_seconds = 0;   // of all threads together, without anything to do
+  bool stopped = false;       // ended early: samples of some pixels of this pass are missing
+  RunReport schedule;         // of the stage graph; empty for executors without one
+  uint64_t state_bytes = 0;   // path state
+  double run_length = 1;      // items per call of the shading kernel
+  double seats_filled = 0;    // SIMD lanes used while shading / lanes of the instruction set, 0..1
+  double idle_seconds = 0;    // of all threads together, without anything to do
+  PathComparison comparison;  // of the reference executor; empty for the others
 };
 
 /// Renders passes into the film of its context. The samples a pass adds, and their values, do not
@@ -72,7 +74,7 @@ class Executor {
                             const std::function<void(double)>& progress) = 0;
 };
 
-/// Both borrow `context` and `kernels`, which must outlive the executor.
+/// All borrow `context` and `kernels`, which must outlive the executor.
 std::unique_ptr<Executor> MakeWavefront(const KernelContext& context, const Kernels& kernels,
                                         std::span<const Placement> placements,
                                         const ExecutorOptions& options);
@@ -84,5 +86,10 @@ std::unique_ptr<Executor> MakeMegakernel(const KernelContext& context, const Ker
 /// timed goes to candidates[0]. `pixels` is how many the image has.
 std::unique_ptr<Executor> MakeFastest(std::vector<std::unique_ptr<Executor>> candidates,
                                       uint64_t pixels);
+
+/// Renders in double, path by path, and compares each path with its float self, one lane of
+/// `kernels`. The image is that of double: the one executor whose bytes are its own.
+std::unique_ptr<Executor> MakeReference(const KernelContext& context, const Kernels& kernels,
+                                        const ExecutorOptions& options);
 
 }  // namespace carpool::stages

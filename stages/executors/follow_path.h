@@ -16,31 +16,52 @@ enum class PathStep : uint8_t {
   missed,    // the ray had left the scene
 };
 
+/// Where the one path that is followed is.
+inline constexpr uint32_t kOnlySlot = 0;
+
+/// The stages of one path, from the float kernels.
+struct KernelSteps {
+  const KernelContext& c;
+  const KernelSet& kernels;
+  const OpacityQuery& opacity;
+
+  void Miss(PathState& path) const { kernels.miss(c, &path, {&kOnlySlot, 1}); }
+  Next Shade(PathState& path) const {
+    Next next = Next::film;
+    kernels.shade(c, &path, {&kOnlySlot, 1}, &next);
+    return next;
+  }
+  void Shadow(PathState& path) const { TraceShadow(c.trace, opacity, path); }
+  void Trace(PathState& path) const { IntersectPath(c.trace, path); }
+};
+
 /// Follows a path whose ray has been traced to its end; `observe(step, path)` hears of each step.
-/// The path's radiance is then its sample.
-template <class Observe>
-void FollowPath(const KernelContext& c, const KernelSet& kernels, const OpacityQuery& opacity,
-                PathState& path, Observe&& observe) {
-  const uint32_t slot = 0;
-  const std::span<const uint32_t> slots(&slot, 1);
+/// The path's radiance is then its sample. `steps` are the stages, in whatever precision.
+template <class Steps, class Path, class Observe>
+void FollowPath(Steps&& steps, Path& path, Observe&& observe) {
   for (;;) {
     if (path.placement < 0) {
-      kernels.miss(c, &path, slots);
+      steps.Miss(path);
       observe(PathStep::missed, path);
       return;
     }
-    Next next = Next::film;
-    kernels.shade(c, &path, slots, &next);
+    Next next = steps.Shade(path);
     observe(PathStep::shaded, path);
     if (next == Next::shadow) {
-      TraceShadow(c.trace, opacity, path);
+      steps.Shadow(path);
       observe(PathStep::shadowed, path);
       next = (path.flags & kPathAlive) != 0 ? Next::trace : Next::film;
     }
     if (next == Next::film) return;
-    IntersectPath(c.trace, path);
+    steps.Trace(path);
     observe(PathStep::traced, path);
   }
+}
+
+template <class Observe>
+void FollowPath(const KernelContext& c, const KernelSet& kernels, const OpacityQuery& opacity,
+                PathState& path, Observe&& observe) {
+  FollowPath(KernelSteps{c, kernels, opacity}, path, observe);
 }
 
 }  // namespace carpool::stages

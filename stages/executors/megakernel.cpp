@@ -1,16 +1,8 @@
 // The megakernel executor: one loop per path over tiles in parallel, from the same kernels at one
 // lane.
-#include <tbb/blocked_range.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
-
-#include <chrono>
-
-#include "stages/executors/busy_clock.h"
 #include "stages/executors/camera_group.h"
-#include "stages/executors/executor.h"
 #include "stages/executors/follow_path.h"
-#include "stages/simd/denormals.h"
+#include "stages/executors/packet_loop.h"
 
 namespace carpool::stages {
 namespace {
@@ -57,35 +49,11 @@ void Megakernel::RenderPacket(const CameraPacket& packet, RayCounts& rays) const
 
 PassReport Megakernel::Render(const CameraPass& pass, const std::atomic<bool>& stop,
                               const std::function<void(double)>& progress) {
-  const auto begin = std::chrono::steady_clock::now();
-  CameraWork work(c_.width, c_.height, pass);
-  tbb::enumerable_thread_specific<RayCounts> tallies;
-  std::atomic<bool> reporting{false};
-  BusyClock clock(options_.threads);
-
-  // Each body keeps claiming the groups of one tile at one sample until none is left: dynamic
-  // balance, no barrier.
-  const auto worker = [&](size_t) {
-    const FlushDenormals denormals;
-    const BusyClock::Scope busy(clock);
-    RayCounts& rays = tallies.local();
-    bool more = true;
-    while (more && !stop.load(std::memory_order_relaxed)) {
-      more = work.Claim(kClaim, [&](const CameraPacket& p) { RenderPacket(p, rays); });
-      if (progress && !reporting.exchange(true, std::memory_order_acquire)) {
-        progress(work.Fraction());
-        reporting.store(false, std::memory_order_release);
-      }
-    }
-  };
-  options_.arena->execute([&] { tbb::parallel_for(size_t{0}, size_t{options_.threads}, worker); });
-
-  PassReport report;
-  for (const RayCounts& rays : tallies) report.rays += rays;
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  report.stopped = work.Fraction() < 1;
+  PassReport report = RunPackets<RayCounts>(
+      c_, options_, pass, stop, progress,
+      [this](const CameraPacket& packet, RayCounts& rays) { RenderPacket(packet, rays); },
+      [](const RayCounts& rays, PassReport& r) { r.rays += rays; });
   report.seats_filled = 1.0 / wide_lanes_;
-  report.idle_seconds = clock.Idle(report.seconds);
   report.state_bytes = uint64_t{options_.threads} * 8 * sizeof(PathState);
   return report;
 }

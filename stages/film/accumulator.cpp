@@ -125,6 +125,7 @@ void FilmAccumulator::Add(uint32_t pixel, uint32_t sample, const float radiance[
   double channels[3] = {radiance[0], radiance[1], radiance[2]};
   bool plain = true;
   for (const double value : channels) plain = plain && value >= 0 && value <= largest_;  // not NaN
+  if (!plain && IsMutant(Mutant::rejected_nan)) return;
   if (!plain) Mend(pixel, sample, channels);
   int64_t fixed[3];
   for (int c = 0; c < 3; ++c) fixed[c] = ToFixed(channels[c]);

@@ -15,6 +15,7 @@
 #endif
 
 #include "stages/kernels/light_math-inl.h"
+#include "stages/mutants.h"
 #include "stages/simd/quads-inl.h"
 #include "stages/tables/light_view.h"
 
@@ -74,10 +75,11 @@ HWY_INLINE Int<D> WrapColumn(D d, Int<D> i, int32_t width) {
 template <class D>
 HWY_INLINE EnvironmentPlace<D> PlaceOfDirection(D d, const EnvironmentView& view,
                                                 const Vec3<D>& dir) {
-  const Real<D> half = Splat(d, 0.5);
+  const Real<D> half = Splat(d, IsMutant(Mutant::shifted_sky) ? 0 : 0.5);
   EnvironmentPlace<D> place;
   place.sin_theta = SafeSqrt(d, hn::MulAdd(dir.x, dir.x, dir.z * dir.z));
-  const Real<D> u = hn::MulAdd(AngleOf(d, dir.x, hn::Neg(dir.z)), Splat(d, 0.5 / kPi), half);
+  const Real<D> u =
+      hn::MulAdd(AngleOf(d, dir.x, hn::Neg(dir.z)), Splat(d, 0.5 / kPi), Splat(d, 0.5));
   const Real<D> v = AngleOf(d, place.sin_theta, dir.y) * Splat(d, 1 / kPi);
   const Int<D> i = SplitFloor(d, hn::MulSub(u, Splat(d, view.width), half), place.fs);
   place.i = WrapColumn(d, i, view.width);

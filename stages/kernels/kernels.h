@@ -26,6 +26,7 @@ enum class DirectSampling : uint8_t { mis, light, bsdf };
 /// path is explained.
 struct PathProbe {
   int32_t lobe = -1;             // that was sampled, in the order of Bsdf's lobes
+  int32_t light = -1;            // that was sampled; -1: the environment, or none
   float light_pdf = 0;           // of the direction that light sampling chose, ...
   float light_bsdf_pdf = 0;      // ... and what BSDF sampling has for it
   float light_weight = 0;        // of that light sample

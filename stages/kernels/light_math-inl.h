@@ -10,8 +10,10 @@
 #define CARPOOL_STAGES_KERNELS_LIGHT_MATH_INL_H_
 #endif
 
-#include "hwy/contrib/math/math-inl.h"
 #include "stages/simd/lanes-inl.h"
+#ifndef CARPOOL_ONE_DOUBLE
+#include "hwy/contrib/math/math-inl.h"
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {

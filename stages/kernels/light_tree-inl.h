@@ -63,7 +63,6 @@ struct NodeLanes {
 };
 template <class D>
 HWY_INLINE NodeLanes<D> LoadNode(D d, const LightNode* nodes, Int<D> node) {
-  const IntTag<D> di;
   const Quad<D> sphere = FieldQuad(d, nodes, node, offsetof(LightNode, center));
   const Quad<D> emission = FieldQuad(d, nodes, node, offsetof(LightNode, axis));
   const Quad<D> rest = FieldQuad(d, nodes, node, offsetof(LightNode, cos_theta_o));
@@ -74,8 +73,8 @@ HWY_INLINE NodeLanes<D> LoadNode(D d, const LightNode* nodes, Int<D> node) {
   lanes.signed_power = emission.w;
   lanes.cos_o = rest.x;
   lanes.cos_e = rest.y;
-  lanes.child_or_light = hn::BitCast(di, rest.z);
-  lanes.parent = hn::BitCast(di, rest.w);
+  lanes.child_or_light = QuadInt(d, nodes, node, offsetof(LightNode, child_or_light), rest.z);
+  lanes.parent = QuadInt(d, nodes, node, offsetof(LightNode, parent), rest.w);
   return lanes;
 }
 

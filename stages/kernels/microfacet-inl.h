@@ -14,6 +14,7 @@
 
 #include <numbers>
 
+#include "stages/mutants.h"
 #include "stages/sampling/warp-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -37,7 +38,11 @@ HWY_INLINE Real<D> GgxDistribution(D d, const Vec3<D>& half, Real<D> length2,
                                    Real<D> inverse_alpha) {
   const Real<D> x = half.x * inverse_alpha;
   const Real<D> y = half.y * inverse_alpha;
-  const Real<D> q = hn::MulAdd(x, x, hn::MulAdd(y, y, half.z * half.z));
+  Real<D> q = hn::MulAdd(x, x, hn::MulAdd(y, y, half.z * half.z));
+  if (IsMutant(Mutant::naive_ggx)) {
+    const Real<D> cos2 = SafeDiv(d, half.z * half.z, length2);
+    q = length2 * hn::MulAdd((Splat(d, 1) - cos2) * inverse_alpha, inverse_alpha, cos2);
+  }
   const Real<D> ratio = length2 / hn::Max(q, Splat(d, kTinyDivisor)) * inverse_alpha;
   return ratio * ratio * Splat(d, 1 / std::numbers::pi);
 }

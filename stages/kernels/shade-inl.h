@@ -15,6 +15,7 @@
 #include "stages/kernels/bsdf-inl.h"
 #include "stages/kernels/kernels.h"
 #include "stages/kernels/light_sample-inl.h"
+#include "stages/kernels/octahedral-inl.h"
 #include "stages/kernels/path-inl.h"
 #include "stages/kernels/surface-inl.h"
 #include "stages/sampling/sobol-inl.h"
@@ -283,6 +284,7 @@ HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& 
   const Real<D> mis = hn::IfThenElse(light.delta, Splat(d, 1),
                                      StrategyWeight(d, c, DirectSampling::light, light.pdf, f.pdf));
   if (c.probe != nullptr) {
+    c.probe->light = hn::GetLane(light.light);
     c.probe->light_pdf = static_cast<float>(hn::GetLane(light.pdf));
     c.probe->light_bsdf_pdf = static_cast<float>(hn::GetLane(f.pdf));
     c.probe->light_weight = static_cast<float>(hn::GetLane(mis));

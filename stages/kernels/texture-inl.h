@@ -171,6 +171,7 @@ struct Nearest {
 template <class D>
 HWY_INLINE Int<D> ToTexel(D d, Real<D> x) {
   const IntTag<D> di;
+  if constexpr (kReference<D>) return hn::ConvertTo(di, x);
   return hn::BitCast(di, x + Splat(d, 0x1p23)) - Broadcast(di, 0x4b000000);
 }
 
@@ -352,6 +353,7 @@ HWY_INLINE Level<D> ChooseLevel(D d, Field filter, Real<D> lod, Real<D> last, Re
   return {number, {mask, !hn::AllFalse(d, mask)}};
 }
 
+#ifndef CARPOOL_ONE_DOUBLE
 /// A texel as four lanes, R first: what one path at a time makes of SIMD, with the same bits.
 using Channels = hn::Vec<hn::FixedTag<float, 4>>;
 template <class Code>
@@ -406,13 +408,15 @@ HWY_INLINE Rgba<D> FilterOne(D d, const TextureTablesView& t, const Encoding<D, 
           hn::LoadU(d, channel + 3)};
 }
 
+#endif
+
 /// The four texels around a point, blended; only the nearest one is read if no lane wants more. All
 /// are fetched before any is decoded, so that their cache misses overlap.
 template <class D, class Condition>
 HWY_INLINE Rgba<D> Filter(D d, const TextureTablesView& t, const Encoding<D, Condition>& encoding,
                           Int<D> offset, Int<D> width, const Axis<D>& x, const Axis<D>& y,
                           bool nearest_only) {
-  if constexpr (hn::MaxLanes(D()) == 1) {
+  if constexpr (hn::MaxLanes(D()) == 1 && !kReference<D>) {
     return FilterOne(d, t, encoding, offset, width, x, y, nearest_only);
   } else {
     const auto fetch = [&](Int<D> texel) { return FetchTexel(d, t, encoding, offset, texel); };
@@ -431,12 +435,18 @@ HWY_INLINE Rgba<D> Filter(D d, const TextureTablesView& t, const Encoding<D, Con
   }
 }
 
+/// 2^-level by its exponent bits: exact, and free of the per-lane shifts that SSE4 lacks.
+template <class D>
+HWY_INLINE Real<D> LevelScale(D d, Int<D> level) {
+  if constexpr (kReference<D>) return hn::Set(d, std::ldexp(1.0, -hn::GetLane(level)));
+  return hn::BitCast(d, hn::ShiftLeft<23>(Broadcast(IntTag<D>(), 127) - level));
+}
+
 /// The sample of one vector. `slot` and `texture` are records that exist in every lane.
 template <class D, class Slot, class Image>
 HWY_INLINE Rgba<D> Sample(D d, const TextureTablesView& t, const Slot& slot, const Image& texture,
                           Mask<D> active, const Vec2<D>& uv, Real<D> log2_footprint,
                           Real<D> u_level) {
-  const IntTag<D> di;
   const Real<D> width0 = ToReal(d, texture.IntAt(offsetof(Texture, width)));
   const Real<D> height0 = ToReal(d, texture.IntAt(offsetof(Texture, height)));
   const Real<D> last = ToReal(d, texture.IntAt(offsetof(Texture, levels))) - Splat(d, 1);
@@ -447,9 +457,8 @@ HWY_INLINE Rgba<D> Sample(D d, const TextureTablesView& t, const Slot& slot, con
   const Level<D> level =
       ChooseLevel(d, slot.IntAt(offsetof(TextureSlot, filter)), lod, last, u_level);
 
-  // 2^-level by its exponent bits: exact, and free of the per-lane shifts that SSE4 lacks.
   const Int<D> number = ToTexel(d, level.number);
-  const Real<D> shrink = hn::BitCast(d, hn::ShiftLeft<23>(Broadcast(di, 127) - number));
+  const Real<D> shrink = LevelScale(d, number);
   const Real<D> width = hn::Max(hn::Floor(width0 * shrink), Splat(d, 1));
   const Real<D> height = hn::Max(hn::Floor(height0 * shrink), Splat(d, 1));
   const Int<D> offset = texture.WordAt(offsetof(Texture, level_offset), number);

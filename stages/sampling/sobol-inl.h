@@ -15,6 +15,7 @@
 
 #include <cstdint>
 
+#include "stages/mutants.h"
 #include "stages/sampling/dimensions.h"
 #include "stages/sampling/lookup-inl.h"
 
@@ -91,6 +92,10 @@ template <class D>
 HWY_INLINE Real<D> UnitFromWord(D d, Word<D> word) {
   const hn::Rebind<int32_t, D> di;
   const auto integer = hn::BitCast(di, hn::ShiftRight<8>(word));
+  if (IsMutant(Mutant::naive_uniform)) {
+    const auto all = hn::BitCast(di, hn::ShiftRight<1>(word));
+    if constexpr (sizeof(hn::TFromD<D>) == 4) return hn::ConvertTo(d, all) * Splat(d, 0x1p-31);
+  }
   if constexpr (sizeof(hn::TFromD<D>) == 4) {
     return hn::ConvertTo(d, integer) * Splat(d, 0x1p-24);
   } else {

@@ -20,6 +20,10 @@ namespace carpool::stages::HWY_NAMESPACE {
 /// way, then Taylor polynomials, whose remainder there is below 2e-9.
 template <class D>
 HWY_INLINE Vec2<D> CosSinTurns(D d, Real<D> turns) {
+  if constexpr (kReference<D>) {
+    const auto angle = 2 * std::numbers::pi * hn::GetLane(turns);
+    return {hn::Set(d, std::cos(angle)), hn::Set(d, std::sin(angle))};
+  }
   const Real<D> quarters = hn::Round(turns * Splat(d, 4));
   const Real<D> angle =
       hn::NegMulAdd(quarters, Splat(d, 0.25), turns) * Splat(d, 2 * std::numbers::pi);
@@ -63,6 +67,7 @@ HWY_INLINE Real<D> PowerOfTwo(D d, Index<D> n) {
 /// polynomial about the nearest integer (remainder below 1e-8).
 template <class D>
 HWY_INLINE Real<D> Exp2Minus1(D d, Real<D> x) {
+  if constexpr (kReference<D>) return hn::Set(d, std::expm1(hn::GetLane(x) * std::numbers::ln2));
   const Real<D> whole = hn::Round(x);
   const Real<D> f = (x - whole) * Splat(d, std::numbers::ln2);
   Real<D> y = hn::MulAdd(f, Splat(d, 1.0 / 5040), Splat(d, 1.0 / 720));

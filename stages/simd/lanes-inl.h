@@ -11,13 +11,27 @@
 #define CARPOOL_STAGES_SIMD_LANES_INL_H_
 #endif
 
+#include <cmath>
 #include <cstdint>
 
+#ifdef CARPOOL_ONE_DOUBLE
+#include "stages/simd/one_double.h"
+#else
 #include "hwy/highway.h"
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+
+/// Is this the reference in double? There, functions are as exact as the C library's.
+#ifdef CARPOOL_ONE_DOUBLE
+template <class D>
+constexpr bool kReference = true;
+#else
+template <class D>
+constexpr bool kReference = false;
+#endif
 
 template <class D>
 using Real = hn::Vec<D>;  // one float (or double) per lane
@@ -150,11 +164,19 @@ HWY_INLINE Vec3<D> Normalize(D d, const Vec3<D>& a) {
 /// log2 of a positive normal float, within 2e-5; exact for powers of two.
 template <class D>
 HWY_INLINE Real<D> FastLog2(D d, Real<D> x) {
-  const IntTag<D> di;
-  const Int<D> bits = hn::BitCast(di, x);
-  const Real<D> exponent = hn::ConvertTo(d, hn::ShiftRight<23>(bits) - Broadcast(di, 127));
-  const Int<D> mantissa = hn::Or(hn::And(bits, Broadcast(di, 0x7fffff)), Broadcast(di, 0x3f800000));
-  const Real<D> t = hn::BitCast(d, mantissa) - Splat(d, 1);
+  Real<D> exponent, t;
+  if constexpr (kReference<D>) {
+    int whole;
+    t = hn::Set(d, 2 * std::frexp(hn::GetLane(x), &whole) - 1);
+    exponent = hn::Set(d, whole - 1);
+  } else {
+    const IntTag<D> di;
+    const Int<D> bits = hn::BitCast(di, x);
+    exponent = hn::ConvertTo(d, hn::ShiftRight<23>(bits) - Broadcast(di, 127));
+    const Int<D> mantissa =
+        hn::Or(hn::And(bits, Broadcast(di, 0x7fffff)), Broadcast(di, 0x3f800000));
+    t = hn::BitCast(d, mantissa) - Splat(d, 1);
+  }
   Real<D> q = Splat(d, 0.0451482938);  // t * q(t) ~ log2(1 + t), q(1) = 1
   q = hn::MulAdd(q, t, Splat(d, -0.193573782));
   q = hn::MulAdd(q, t, Splat(d, 0.41560437));

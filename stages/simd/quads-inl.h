@@ -91,6 +91,17 @@ HWY_INLINE Quad<D> FieldQuad(D d, const Record* HWY_RESTRICT base, Int<D> index,
                     index * hn::Set(di, static_cast<int32_t>(sizeof(Record) / 4)));
 }
 
+/// The integer in word `word`, from byte `offset`, of a quad that was loaded from there. Where a
+/// float is widened as it is loaded, the record is read again.
+template <class Record, class D>
+HWY_INLINE Int<D> QuadInt(D d, const Record* base, Int<D> index, size_t offset, Real<D> word) {
+  if constexpr (kReference<D>) {
+    return FieldInt(d, base, index, offset);
+  } else {
+    return hn::BitCast(IntTag<D>(), word);
+  }
+}
+
 }  // namespace carpool::stages::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

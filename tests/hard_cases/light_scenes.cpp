@@ -134,16 +134,16 @@ Sky BorderedSky() {
   return sky;
 }
 
-/// Row 33: 10^4 point lights whose powers span twelve decades, on a sphere around the patch: only
-/// the sum of cos I counts.
+/// Row 33: 10^4 point lights (10^5 at full length) whose powers span twelve decades, on a sphere
+/// around the patch: only the sum of cos I counts.
 ClosedForm ManyLights() {
-  constexpr int kLights = 10'000;
+  const int lights = AtFullLength() ? 100'000 : 10'000;
   SceneCase c = OverFloor("row33_lights_over_12_decades");
   double sum = 0;
-  for (int i = 0; i < kLights; ++i) {
-    const double u = (i + 0.5) / kLights, angle = i * 2.399963;  // golden angle
+  for (int i = 0; i < lights; ++i) {
+    const double u = (i + 0.5) / lights, angle = i * 2.399963;  // golden angle
     const double height = 0.2 + 0.8 * u, side = std::sqrt(1 - height * height);
-    const double intensity = std::pow(10.0, -9 + 12 * ((i * 7919) % kLights) / (kLights - 1.0));
+    const double intensity = std::pow(10.0, -9 + 12 * ((i * 7919ll) % lights) / (lights - 1.0));
     c.scene.AddPunctual(
         {{"type", "point"}, {"intensity", intensity}},
         {{"translation", {3 * side * std::cos(angle), 3 * height, 3 * side * std::sin(angle)}}});

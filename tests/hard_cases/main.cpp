@@ -14,7 +14,9 @@ namespace carpool::test {
 namespace {
 
 constexpr const char* kUsage =
-    "usage: hard-cases [--write DIR | --table | --json FILE] [--gtest_filter=PATTERN ...]\n"
+    "usage: hard-cases [--full] [--write DIR | --table | --json FILE] [--gtest_filter=PATTERN "
+    "...]\n"
+    "  --full        with counts that take too long for the suite: 2^30 samples, 10^5 lights\n"
     "  --write DIR   writes every scene of the suite as glTF, with its sky, and how to render it\n"
     "  --table       prints how stable rays are at all scales and offsets, robust or not\n"
     "  --json FILE   runs the suite and writes what it measured\n";
@@ -27,11 +29,18 @@ void WriteAll(const std::filesystem::path& folder) {
   }
 }
 
+/// The scenes depend on it, and GoogleTest lists the scenes first of all.
+void ReadLength(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) AtFullLength() |= std::string_view(argv[i]) == "--full";
+}
+
 int Run(int argc, char** argv) {
+  ReadLength(argc, argv);
   testing::InitGoogleTest(&argc, argv);  // takes its own flags away
   std::string json;
   for (int i = 1; i < argc; ++i) {
     const std::string_view flag = argv[i];
+    if (flag == "--full") continue;
     if (flag == "--write" && i + 1 < argc) {
       WriteAll(argv[i + 1]);
       return 0;

@@ -33,6 +33,11 @@ const std::vector<Twins>& AllTwins() {
   return all;
 }
 
+bool& AtFullLength() {
+  static bool full = false;
+  return full;
+}
+
 std::vector<SceneCase> AllScenes() {
   std::vector<SceneCase> scenes;
   std::set<std::string> seen;

@@ -34,6 +34,10 @@ inline void PrintTo(const Twins& twins, std::ostream* out) {
 }
 const std::vector<Twins>& AllTwins();
 
+/// `hard-cases --full`: counts as the list of hard cases has them, where the suite makes do with
+/// fewer.
+bool& AtFullLength();
+
 /// Both lists' scenes, each once.
 std::vector<SceneCase> AllScenes();
 

@@ -1,6 +1,6 @@
-// `soak`: the closed forms again and again with fresh seeds, turned and moved at random, for as
-// long as one likes; then whether p-values were uniform, and the smallest bias that would have been
-// seen.
+// `soak`: the statistical cases again and again with fresh seeds, at random scales, places and
+// brightnesses, and random scenes beside them, for as long as one likes; then whether p-values were
+// uniform, and the smallest bias that would have been seen.
 #include <chrono>
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -9,89 +9,164 @@
 #include <random>
 
 #include "tests/hard_cases/figures.h"
-#include "tests/hard_cases/scenes.h"
+#include "tests/hard_cases/variations.h"
 #include "tests/render/session/render_once.h"
 
 namespace carpool::test {
 namespace {
 
 constexpr int kSeeds = 16;
-
-/// Puts everything, camera included, under one node with a random rotation and place, which no
-/// image depends on.
-void MoveAtRandom(SceneCase& scene, std::mt19937& rng) {
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> decade(0, 6);
-  double q[4], length = 0;
-  for (double& x : q) {
-    x = normal(rng);
-    length += x * x;
-  }
-  const double far = std::pow(10.0, decade(rng)) - 1;  // up to 1e6 m from the origin
-  nlohmann::json& roots = scene.scene.json()["scenes"][0]["nodes"];
-  const nlohmann::json children = roots;
-  roots = nlohmann::json::array();
-  nlohmann::json parent = {
-      {"children", children},
-      {"translation", {far * normal(rng), far * normal(rng), far * normal(rng)}},
-      {"rotation", nlohmann::json::array()}};
-  for (const double x : q) parent["rotation"].push_back(x / std::sqrt(length));
-  scene.scene.AddNode(parent);
-}
+/// One of ten thousand runs may well be below 1e-4; below this none is by chance.
+constexpr double kFailure = 1e-9;
 
 /// What the runs so far have shown.
 struct Tally {
   std::vector<double> deciles = std::vector<double>(10);
-  uint64_t runs = 0, failures = 0, faulty_samples = 0;
+  uint64_t runs = 0, failures = 0;
+  uint64_t not_finite = 0, faulty = 0;     // samples
   double paths = 0, bias = 0, weight = 0;  // mean relative error, weighted by its precision
 };
 
-void RunOnce(ClosedForm form, std::mt19937& rng, Tally& tally) {
-  if (form.scene.sky.width <= 1) MoveAtRandom(form.scene, rng);  // a sky stays where it is
-  const ScratchFolder folder;
-  render::RenderSettings settings = WriteCase(form.scene, folder.path());
-  Mean mean;
-  const uint32_t first = static_cast<uint32_t>(rng());
-  for (int i = 0; i < kSeeds; ++i) {
-    settings.seed = first + static_cast<uint32_t>(i);
-    const Rendered rendered = RenderOnce(settings);
-    tally.faulty_samples += rendered.summary.ledger.Count();
-    tally.paths += static_cast<double>(rendered.summary.rays.camera);
-    mean.Add(MeanOf(rendered.image, "G"));
-  }
-  const double scale = std::abs(form.claim.expected);
-  const double p = MeanTail(mean, form.claim.expected, (form.claim.slack + kRounding) * scale);
-  ++tally.runs;
-  // One of ten thousand runs may well be below 1e-4; below 1e-9 none is by chance.
-  if (p < 1e-9) {
-    ++tally.failures;
-    std::printf("FAILED %s: expected %.9g, measured %.9g +- %.2g, p = %.2g, seeds from %u\n",
-                form.scene.name.c_str(), form.claim.expected, mean.Value(), mean.Error(), p, first);
-  }
-  const double error = mean.Error() / scale;
-  if (form.claim.slack > 0 || error < 10 * kRounding) return;  // neither p nor error is pure noise
-  ++tally.deciles[static_cast<size_t>(std::min(9.0, 10 * p))];
-  tally.bias += (mean.Value() / form.claim.expected - 1) / (error * error);
-  tally.weight += 1 / (error * error);
-}
+class Soak {
+ public:
+  Soak(uint32_t seed, int effort, std::vector<std::string> files)
+      : rng_(seed), effort_(effort), files_(std::move(files)) {}
 
-int Report(const Tally& tally, const std::string& json) {
+  /// One case, whichever comes.
+  void RunOne() {
+    const uint32_t lot = rng_() % 1000;
+    if (lot < 4) {
+      RunForm(DomeOfLights(500, rng_));
+    } else if (lot < 250) {
+      RunForm(RandomFurnace(rng_));
+    } else if (lot < 350) {
+      RunForm(RandomWhiteSphere(rng_));
+    } else if (lot < 500 && !files_.empty()) {
+      RunFile(files_[rng_() % files_.size()]);
+    } else if (lot < 600) {
+      RunTwins(AllTwins()[rng_() % AllTwins().size()]);
+    } else {
+      RunForm(ClosedForms()[rng_() % ClosedForms().size()]);
+    }
+  }
+  const Tally& tally() const { return tally_; }
+
+ private:
+  /// Green means of renders with seeds from `first` on, and what their ledgers say.
+  Mean Estimate(const render::RenderSettings& usual, uint32_t first, const std::string& what) {
+    render::RenderSettings settings = usual;
+    Mean mean;
+    for (uint32_t i = 0; i < kSeeds; ++i) {
+      settings.seed = first + i;
+      const Rendered rendered = RenderOnce(settings);
+      Count(rendered.summary, what + ", seed " + std::to_string(settings.seed));
+      mean.Add(MeanOf(rendered.image, "G"));
+    }
+    return mean;
+  }
+
+  void Count(const render::RenderSummary& summary, const std::string& what) {
+    tally_.paths += static_cast<double>(summary.rays.camera);
+    if (summary.ledger.Count() == 0) return;
+    tally_.faulty += summary.ledger.Count();
+    tally_.not_finite += summary.ledger.Of(stages::SampleFault::not_finite).count;
+    std::printf("LEDGER %s: %llu samples\n", what.c_str(),
+                static_cast<unsigned long long>(summary.ledger.Count()));
+  }
+
+  void RunForm(ClosedForm form) {
+    const Variation v = Vary(form.scene, form.claim.expected, rng_);
+    const double expected = form.claim.expected * v.brightness;
+    form.scene.settings.samples *= effort_;
+    const ScratchFolder folder;
+    const uint32_t first = rng_();
+    const std::string what = form.scene.name + " (" + v.Text() + ")";
+    const Mean mean = Estimate(WriteCase(form.scene, folder.path()), first, what);
+    // Half a step of the film is what a sample may be off.
+    const double rounding = kRounding + 0x1p-33 / expected;
+    const double p = MeanTail(mean, expected, (form.claim.slack + rounding) * expected);
+    Judge(what, p, expected, mean, first);
+    const double error = mean.Error() / expected;
+    // Neither p nor error may be rounding's, or the claim's own.
+    if (form.claim.slack > 1e-5 || error < 10 * rounding) return;
+    const double exact = MeanTail(mean, expected, 0);
+    ++tally_.deciles[static_cast<size_t>(std::min(9.0, 10 * exact))];
+    tally_.bias += (mean.Value() / expected - 1) / (error * error);
+    tally_.weight += 1 / (error * error);
+  }
+
+  void RunTwins(Twins twins) {
+    Mean means[2];
+    std::string what;
+    double brightness[2];
+    const uint32_t first = rng_();
+    for (int i = 0; i < 2; ++i) {
+      SceneCase& scene = i == 0 ? twins.a : twins.b;
+      // Row 46 has scales of its own.
+      const bool vary = twins.row != 46;
+      const Variation v = vary ? Vary(scene, 1, rng_) : Variation{};
+      brightness[i] = v.brightness;
+      what += (i == 0 ? "" : " = ") + scene.name + " (" + v.Text() + ")";
+      const ScratchFolder folder;
+      means[i] =
+          Estimate(WriteCase(scene, folder.path()), first + 1000 * static_cast<uint32_t>(i), what)
+              .Scaled(1 / brightness[i]);
+    }
+    means[1] = means[1].Scaled(twins.scale);
+    const double step = 0x1p-33 / std::min(brightness[0], brightness[1]);
+    const double slack = (twins.claim.slack + kRounding) * std::abs(means[0].Value()) + step;
+    const double p = WelchTail(means[0], means[1], slack);
+    Judge(what, p, means[0].Value(), means[1], first);
+  }
+
+  /// A scene whose image nobody knows: its samples are counted.
+  void RunFile(const std::string& path) {
+    render::RenderSettings settings = HardSettings(64 * effort_, 8);
+    settings.width = settings.height = 64;
+    settings.scene_path = path;
+    settings.seed = rng_();
+    Count(RenderOnce(settings).summary, path + ", seed " + std::to_string(settings.seed));
+    ++tally_.runs;
+  }
+
+  void Judge(const std::string& what, double p, double expected, const Mean& mean, uint32_t first) {
+    ++tally_.runs;
+    if (p >= kFailure) return;
+    ++tally_.failures;
+    std::printf("FAILED %s: expected %.9g, measured %.9g +- %.2g, p = %.2g, seeds from %u\n",
+                what.c_str(), expected, mean.Value(), mean.Error(), p, first);
+  }
+
+  std::mt19937 rng_;
+  int effort_;
+  std::vector<std::string> files_;
+  Tally tally_;
+};
+
+std::vector<tools::Row> Rows(const Tally& tally) {
   double counted = 0;
   for (const double n : tally.deciles) counted += n;
   const double uniformity =
       ChiSquaredTest(tally.deciles, std::vector<double>(10, std::max(counted, 1e-9) / 10));
   const double error = tally.weight > 0 ? 1 / std::sqrt(tally.weight) : 0;
   const double bias = tally.weight > 0 ? tally.bias / tally.weight : 0;
-  std::vector<tools::Row> rows = {
+  return {
       {"runs", static_cast<double>(tally.runs), "", "", true},
       {"paths", tally.paths, "", "", true},
       {"failed runs, p < 1e-9", static_cast<double>(tally.failures), "", "== 0",
        tally.failures == 0},
-      {"samples in the ledger", static_cast<double>(tally.faulty_samples), "", "== 0",
-       tally.faulty_samples == 0},
+      {"samples that are not finite", static_cast<double>(tally.not_finite), "", "== 0",
+       tally.not_finite == 0},
+      {"samples in the ledger", static_cast<double>(tally.faulty), "", "== 0", tally.faulty == 0},
+      {"p-values", counted, "", "", true},
       {"uniformity of p-values", uniformity, "p", ">= 1e-6", uniformity >= kFalseAlarm},
       {"common relative bias", bias, "", "", true},
+      {"its standard error", error, "", "", true},
       {"smallest common bias that would be seen", (kLargestZ + 2.33) * error, "", "", true}};
+}
+
+int Report(const Tally& tally, const std::string& json) {
+  const std::vector<tools::Row> rows = Rows(tally);
   tools::PrintRows(rows);
   if (!json.empty()) std::ofstream(json) << tools::RowsJson(rows);
   for (const tools::Row& row : rows) {
@@ -100,31 +175,35 @@ int Report(const Tally& tally, const std::string& json) {
   return 0;
 }
 
-int Soak(int argc, char** argv) {
-  CLI::App program("the closed forms with fresh seeds, turned and moved at random");
+int Main(int argc, char** argv) {
+  CLI::App program("the statistical cases with fresh seeds, scaled, moved and lit at random");
   double seconds = 60;
   uint32_t seed = std::random_device()();
+  int effort = 4;
   std::string json;
+  std::vector<std::string> files;
   program.add_option("--seconds", seconds, "how long (default: 60)");
   program.add_option("--seed", seed, "repeats a run (default: fresh)");
+  program.add_option("--effort", effort, "multiplies the samples of the suite (default: 4)");
   program.add_option("--json", json, "also writes the figures as rows");
+  program.add_option("files", files, "glTF files whose samples are to be counted, too");
   CLI11_PARSE(program, argc, argv);
   std::printf("soak --seed %u\n", seed);
+  std::fflush(stdout);
 
-  std::mt19937 rng(seed);
-  Tally tally;
+  Soak soak(seed, effort, files);
   const auto begin = std::chrono::steady_clock::now();
-  const std::vector<ClosedForm>& forms = ClosedForms();
   do {
-    RunOnce(forms[rng() % forms.size()], rng, tally);
+    soak.RunOne();
+    std::fflush(stdout);
   } while (std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() <
            seconds);
-  return Report(tally, json);
+  return Report(soak.tally(), json);
 }
 
 }  // namespace
 }  // namespace carpool::test
 
 int main(int argc, char** argv) {
-  return carpool::test::Soak(argc, argv);
+  return carpool::test::Main(argc, argv);
 }

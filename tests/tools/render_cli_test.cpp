@@ -65,6 +65,17 @@ TEST_F(RenderCliTest, WritesWhatIsAskedFor) {
   EXPECT_EQ(ReadFile(preview).substr(0, 4), kPngMagic);
 }
 
+TEST_F(RenderCliTest, TheReferenceListsTheWorstPaths) {
+  const std::string stats = folder_ / "stats.json";
+  const Outcome outcome =
+      Carpool(Render({"--samples", "4", "--executor", "reference", "--stats", stats}));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  ExpectImage();
+  EXPECT_NE(outcome.out.find("float against double: 4096 paths"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find(" sample "), std::string::npos) << outcome.out;
+  EXPECT_NE(ReadFile(stats).find(R"("worst")"), std::string::npos);
+}
+
 TEST_F(RenderCliTest, TimeEndsARenderThatWouldTakeHours) {
   const Outcome outcome = Carpool(Render({"--time", "0.3"}));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -58,6 +58,7 @@ TEST(Settings, EachValueOutOfRangeIsRefusedByItsFlag) {
       {"--output", [](auto& s) { s.output_path = ".exr"; }},
       {"--preview", [](auto& s) { s.preview_path = "a.jpg"; }},
       {"--trace", [](auto& s) { s.trace_path = "t.json", s.executor = Executor::megakernel; }},
+      {"--trace", [](auto& s) { s.trace_path = "t.json", s.executor = Executor::reference; }},
       {"no scene", [](auto& s) { s.scene_path = ""; }},
   };
   for (const auto& [flag, change] : cases) {
@@ -76,7 +77,8 @@ TEST(Settings, LimitsThemselvesAreValid) {
 }
 
 TEST(Settings, NamesAreReadBack) {
-  for (const auto e : {Executor::automatic, Executor::wavefront, Executor::megakernel}) {
+  for (const auto e :
+       {Executor::automatic, Executor::wavefront, Executor::megakernel, Executor::reference}) {
     EXPECT_EQ(ParseExecutor(Name(e)), e);
   }
   for (const auto p : {Policy::deepest, Policy::fullest, Policy::oldest}) {
@@ -89,7 +91,7 @@ TEST(Settings, NamesAreReadBack) {
 
 TEST(Settings, UnknownNamesAreRefusedWithTheKnownOnes) {
   EXPECT_EQ(RefusalOf([] { ParseExecutor("gpu"); }),
-            "--executor: 'gpu' is unknown; use one of auto, wavefront, megakernel");
+            "--executor: 'gpu' is unknown; use one of auto, wavefront, megakernel, reference");
   EXPECT_NE(RefusalOf([] { ParsePolicy(""); }).find("deepest, fullest, oldest"), std::string::npos);
   EXPECT_NE(RefusalOf([] { ParseIsa("AVX2"); }).find("sse4"), std::string::npos);
 }

@@ -81,7 +81,8 @@ void AddSceneFlags(CLI::App& command, RenderFlags& flags) {
       ->type_name("NAME");
   command
       .add_option("--executor", flags.executor,
-                  "wavefront, megakernel or auto (default); the image is the same")
+                  "wavefront, megakernel or auto (default), with the same image; reference: in "
+                  "double, with float compared to it path by path")
       ->type_name("NAME");
   command.add_flag("--no-robust", flags.no_robust,
                    "faster rays that may slip through where triangles meet");
