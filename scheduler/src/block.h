@@ -25,6 +25,7 @@ struct ReadyBlock {
   Block block;
   FlushCause cause = FlushCause::full;
   bool partial = false;    // counted, because the memory formula counts on there being few
+  bool offered = false;    // by its owner to whoever has no work
   std::uint32_t lane = 0;  // in the ReadyQueue
   ReadyBlock* newer = nullptr;
   ReadyBlock* older = nullptr;

@@ -64,17 +64,18 @@ class CreditCache {
     }
   }
 
-  // reserve fills the pocket to between `least` and `most`, and returns what is in it, or 0.
+  // reserve fills the pocket to between `least` and `most`, and returns what is in it, or 0. While
+  // the purse is in debt, what is in the pocket is not free either: others have grown into it.
   std::int64_t reserve(std::int64_t least, std::int64_t most) {
+    std::int64_t got = 0;
     if (pocket_ < most) {
-      const std::int64_t got =
-          purse_.try_take(std::max<std::int64_t>(1, least - pocket_), most - pocket_);
+      got = purse_.try_take(std::max<std::int64_t>(1, least - pocket_), most - pocket_);
       if (got > 0) {
         pocket_ += got;
         note_lent(purse_.available());
       }
     }
-    return pocket_ >= least ? pocket_ : 0;
+    return pocket_ >= least && (got > 0 || purse_.available() >= 0) ? pocket_ : 0;
   }
 
   void return_all() {

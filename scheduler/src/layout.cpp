@@ -212,7 +212,8 @@ std::uint32_t Layout::class_of(std::uint32_t bytes) const {
 
 // The derivation is in README.md, section "Memory".
 void Layout::limit_classes(bool spill) {
-  std::uint64_t partials = std::uint64_t{workers} * kPartialsPerWorker;
+  // Each worker's own, and as many stolen ones, which it runs before it steals again.
+  std::uint64_t partials = std::uint64_t{workers} * 2 * kPartialsPerWorker;
   for (const StageLayout& stage : stages) {
     partials += stage.cap;  // one for each token
   }

@@ -1,6 +1,7 @@
 // The bucket queue of published blocks.
 #include "ready_queue.h"
 
+#include <algorithm>
 #include <mutex>
 
 namespace carpool {
@@ -65,7 +66,7 @@ ReadyBlock* ReadyQueue::steal(std::uint32_t items) {
     return nullptr;
   }
   const std::lock_guard guard(lock_, std::adopt_lock);
-  std::uint32_t budget = size() / 2;
+  std::uint32_t budget = std::min(size() / 2, kPartialsPerWorker);
   ReadyBlock* list = nullptr;
   ReadyBlock** tail = &list;
   std::uint32_t taken = 0;

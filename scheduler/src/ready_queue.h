@@ -7,6 +7,7 @@
 
 #include "bitmap.h"
 #include "block.h"
+#include "layout.h"
 #include "spin_lock.h"
 
 namespace carpool {

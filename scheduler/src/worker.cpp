@@ -184,8 +184,8 @@ bool Worker::take_ready(Work& work, std::uint32_t end_lane) {
   if (ready == nullptr) {
     return false;
   }
+  taken_back_ += ready->offered ? 1 : 0;
   unpack(ready, work);
-  taken_back_ += work.cause == FlushCause::asked ? 1 : 0;
   return true;
 }
 
@@ -252,6 +252,10 @@ bool Worker::steal(Work& work) {
     while (rest != nullptr) {
       ReadyBlock* next = rest->newer;
       ++runner_.stats().stages[rest->block.stage].steals;
+      if (rest->offered) {  // from now on this worker's own, to be run before it steals again
+        rest->offered = false;
+        rest->lane -= in_order_ ? 0 : layout_.lanes;
+      }
       ready_.push(rest);
       rest = next;
     }
@@ -441,7 +445,8 @@ void Worker::push_ready(const Block& block, FlushCause cause) {
   ready->partial = cause != FlushCause::full && cause != FlushCause::count;
   // Full blocks before partial ones. A block that has lingered counts as full: it has waited
   // enough.
-  ready->lane = lane_of(block) + (cause == FlushCause::asked && !in_order_ ? layout_.lanes : 0);
+  ready->offered = cause == FlushCause::asked;
+  ready->lane = lane_of(block) + (ready->offered && !in_order_ ? layout_.lanes : 0);
   ready_.push(ready);
   if (gate_.hungry(gate_.view())) {
     core_.invite();

@@ -246,4 +246,21 @@ TEST(BlockPoolTest, BlocksTravelBetweenWorkers) {
   EXPECT_LE(pool.allocated_bytes(), layout.block_bytes());
 }
 
+TEST(CreditsTest, WhatAPocketHoldsIsNotFreeWhileThePurseIsInDebt) {
+  carpool::Credits purse(100);
+  carpool::CreditCache mine(purse, 2);
+  carpool::CreditCache other(purse, 2);
+  EXPECT_EQ(other.reserve(90, 100), 100);
+  other.settle(130, 0);  // items have grown into more than there are credits for
+  EXPECT_EQ(purse.available(), -30);
+  mine.settle(0, 20);  // others have retired here
+  EXPECT_EQ(mine.pocket(), 20);
+  EXPECT_EQ(mine.reserve(3, 20), 0) << "or more would be in flight than the limit allows";
+  mine.return_all();
+  EXPECT_EQ(purse.available(), -10);
+  other.settle(0, 40);
+  other.return_all();
+  EXPECT_EQ(mine.reserve(3, 20), 20);
+}
+
 }  // namespace

@@ -16,8 +16,10 @@ using carpool_test::RandomGraph;
 using carpool_test::Shape;
 
 void check(const Shape& shape, const carpool::RunOptions& options) {
+  SCOPED_TRACE("shape's seed " + std::to_string(shape.seed));
   RandomGraph random(shape);
-  const carpool::RunReport report = carpool::run(random.graph(), options);
+  carpool::RunReport report;
+  ASSERT_NO_THROW(report = carpool::run(random.graph(), options));
   random.forbid_calls();
   EXPECT_EQ(random.counted(), random.expected()) << "seed " << shape.seed;
   EXPECT_TRUE(random.caps_held()) << "seed " << shape.seed;
