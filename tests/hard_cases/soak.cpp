@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <random>
 
@@ -29,8 +30,8 @@ struct Tally {
 
 class Soak {
  public:
-  Soak(uint32_t seed, int effort, std::vector<std::string> files)
-      : rng_(seed), effort_(effort), files_(std::move(files)) {}
+  Soak(uint32_t seed, int effort, std::string keep, std::vector<std::string> files)
+      : rng_(seed), effort_(effort), keep_(std::move(keep)), files_(std::move(files)) {}
 
   /// One case, whichever comes.
   void RunOne() {
@@ -85,7 +86,7 @@ class Soak {
     // Half a step of the film is what a sample may be off.
     const double rounding = kRounding + 0x1p-33 / expected;
     const double p = MeanTail(mean, expected, (form.claim.slack + rounding) * expected);
-    Judge(what, p, expected, mean, first);
+    if (!Judge(what, p, expected, mean, first)) Keep(folder, form.scene.name);
     const double error = mean.Error() / expected;
     // Neither p nor error may be rounding's, or the claim's own.
     if (form.claim.slack > 1e-5 || error < 10 * rounding) return;
@@ -129,16 +130,31 @@ class Soak {
     ++tally_.runs;
   }
 
-  void Judge(const std::string& what, double p, double expected, const Mean& mean, uint32_t first) {
+  /// False if that was no chance.
+  bool Judge(const std::string& what, double p, double expected, const Mean& mean, uint32_t first) {
     ++tally_.runs;
-    if (p >= kFailure) return;
+    if (p >= kFailure) return true;
     ++tally_.failures;
     std::printf("FAILED %s: expected %.9g, measured %.9g +- %.2g, p = %.2g, seeds from %u\n",
                 what.c_str(), expected, mean.Value(), mean.Error(), p, first);
+    return false;
+  }
+
+  /// Saves the files of a scene that failed, to be rendered again.
+  void Keep(const ScratchFolder& folder, const std::string& name) const {
+    if (keep_.empty()) return;
+    const std::filesystem::path to =
+        std::filesystem::path(keep_) / (std::to_string(tally_.runs) + "_" + name);
+    std::filesystem::create_directories(to);
+    std::filesystem::copy(folder.path(), to,
+                          std::filesystem::copy_options::overwrite_existing |
+                              std::filesystem::copy_options::recursive);
+    std::printf("       its files are in %s\n", to.c_str());
   }
 
   std::mt19937 rng_;
   int effort_;
+  std::string keep_;
   std::vector<std::string> files_;
   Tally tally_;
 };
@@ -180,18 +196,19 @@ int Main(int argc, char** argv) {
   double seconds = 60;
   uint32_t seed = std::random_device()();
   int effort = 4;
-  std::string json;
+  std::string json, keep;
   std::vector<std::string> files;
   program.add_option("--seconds", seconds, "how long (default: 60)");
   program.add_option("--seed", seed, "repeats a run (default: fresh)");
   program.add_option("--effort", effort, "multiplies the samples of the suite (default: 4)");
   program.add_option("--json", json, "also writes the figures as rows");
+  program.add_option("--keep", keep, "folder for the scenes of closed forms that fail");
   program.add_option("files", files, "glTF files whose samples are to be counted, too");
   CLI11_PARSE(program, argc, argv);
   std::printf("soak --seed %u\n", seed);
   std::fflush(stdout);
 
-  Soak soak(seed, effort, files);
+  Soak soak(seed, effort, keep, files);
   const auto begin = std::chrono::steady_clock::now();
   do {
     soak.RunOne();
