@@ -25,7 +25,7 @@ class Bitmap {
       all += words;
     } while (words > 1);
     begins_[storeys_] = static_cast<std::uint32_t>(all);
-    words_.resize(all, 0);
+    words_.assign(all, 0);
   }
 
   void set(std::uint32_t index) {
