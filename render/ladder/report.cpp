@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "render/base/html.h"
 #include "render/ladder/ladder.h"
 
 namespace carpool::render {
@@ -28,20 +29,6 @@ std::string Title(const LadderReport& report) {
   return report.scene +
          Format(": %dx%d, %d samples, ", report.width, report.height, report.samples) +
          Format("%d threads, %s, medians of %d", report.threads, report.isa.c_str(), report.rounds);
-}
-
-std::string Escape(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
 }
 
 }  // namespace

@@ -3,13 +3,13 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <vector>
 
 #include "stages/executors/camera_work.h"
 #include "stages/film/accumulator.h"
+#include "tools/bench/rows.h"
 
 namespace carpool::tools {
 namespace {
@@ -68,12 +68,6 @@ double TimeAdding(Film& film, uint32_t width, uint32_t height, tbb::task_arena& 
   });
   const std::chrono::duration<double, std::nano> took = std::chrono::steady_clock::now() - begin;
   return took.count() * threads / (double{kSamples} * width * height);
-}
-
-double Median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
 }
 
 }  // namespace

@@ -4,8 +4,12 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "render/base/html.h"
+
 namespace carpool::tools {
 namespace {
+
+using render::Escape;
 
 constexpr char kHead[] = R"(<!doctype html>
 <meta charset="utf-8">
@@ -30,20 +34,6 @@ std::string Format(const char* format, Args... args) {
   char text[512];
   std::snprintf(text, sizeof text, format, args...);
   return text;
-}
-
-std::string Escape(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
 }
 
 std::string Bar(double value, double most, const char* kind) {

@@ -1,6 +1,7 @@
 // Figures of a benchmark: a table for people, and rows of JSON for scripts.
 #pragma once
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -16,6 +17,13 @@ struct Row {
   std::string target;  // e.g. ">= 1"; empty: none
   bool holds = true;
 };
+
+/// The middle of an odd number of values, or the upper of the two middle ones. Not of none.
+inline double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 inline void PrintRows(const std::vector<Row>& rows) {
   for (const Row& row : rows) {

@@ -13,12 +13,6 @@ namespace {
 
 using render::Executor;
 
-double Median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
-}
-
 render::RenderSettings SettingsFor(const SceneCase& scene, const BenchOptions& o) {
   render::RenderSettings s;
   s.scene_path = scene.path;

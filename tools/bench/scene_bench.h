@@ -34,7 +34,6 @@ struct SceneFigures {
   SceneCase scene;
   std::string isa;
   int threads = 0;
-  uint64_t triangles = 0;                          // as drawn
   double load_seconds = 0, bvh_seconds = 0;        // load: everything before the BVH
   double wave = 0, mega = 0;                       // M rays/s
   double embree_plain = 0, embree_sorted = 0;      // M rays/s of the same rays in bare Embree
