@@ -158,7 +158,8 @@ stages::TraceView Bvh::View() const {
   const auto view = [](const Level& level) {
     return TraceLevel{level.scene.get(), level.top.data(), level.nested.data()};
   };
-  return {view(opaque_), view(transparent_), stages::ViewOf(geometry_)};
+  return {view(opaque_), view(transparent_), stages::ViewOf(geometry_),
+          stages::NativePacketSize(device_.get())};
 }
 
 }  // namespace carpool::render

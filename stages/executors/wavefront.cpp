@@ -207,11 +207,12 @@ void Wavefront::CameraKernel(const Batch<CameraPacket>& batch, Emitter& out) {
 
 void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {
   const FlushDenormals denormals;
-  for (size_t i = 0; i < batch.items.size(); ++i) {
-    if (i + 4 < batch.items.size()) __builtin_prefetch(&paths_[batch.items[i + 4]]);
-    IntersectPath(c_.trace, paths_[batch.items[i]]);
-    EmitHit(batch.items[i], out);
+  if (options_.simd) {
+    IntersectPaths(c_.trace, paths_.data(), batch.items);
+  } else {
+    for (const Slot slot : batch.items) IntersectPath(c_.trace, paths_[slot]);
   }
+  for (const Slot slot : batch.items) EmitHit(slot, out);
   tallies_[batch.worker].rays.bounce += batch.items.size();
 }
 
@@ -230,11 +231,13 @@ void Wavefront::ShadeKernel(const Batch<Slot>& batch, Emitter& out) {
 
 void Wavefront::ShadowKernel(const Batch<Slot>& batch, Emitter& out) {
   const FlushDenormals denormals;
-  for (size_t i = 0; i < batch.items.size(); ++i) {
-    if (i + 4 < batch.items.size()) __builtin_prefetch(&paths_[batch.items[i + 4]]);
-    PathState& path = paths_[batch.items[i]];
-    TraceShadow(c_.trace, opacity_, path);
-    out.emit((path.flags & kPathAlive) != 0 ? intersect_ : film_, 0, batch.items[i]);
+  if (options_.simd) {
+    TraceShadows(c_.trace, opacity_, paths_.data(), batch.items);
+  } else {
+    for (const Slot slot : batch.items) TraceShadow(c_.trace, opacity_, paths_[slot]);
+  }
+  for (const Slot slot : batch.items) {
+    out.emit((paths_[slot].flags & kPathAlive) != 0 ? intersect_ : film_, 0, slot);
   }
   tallies_[batch.worker].rays.shadow += batch.items.size();
 }

@@ -54,7 +54,7 @@ void Gather(const TraceLevel& level, bool opaque, RTCRay ray, const TriangleName
             std::vector<LayerHit>& hits) {
   if (level.scene == nullptr) return;
   // Accepting none, the query meets all.
-  EmbreeOccluded1(level.scene, &ray, [&](const RTCHit& hit, float distance) {
+  EmbreeOccluded1(level.scene, &ray, [&](unsigned, const RTCHit& hit, float distance) {
     const int32_t placement = PlacementOf(level, hit.instID[0], hit.geomID);
     if (left != TriangleName{placement, hit.primID})
       hits.push_back({distance, placement, hit.primID, hit.u, hit.v, opaque});

@@ -1,6 +1,8 @@
-// Ray queries through Embree: single rays for what bounced, coherent packets for camera rays.
+// Ray queries through Embree: single rays, packets of what bounced, coherent packets for camera
+// rays.
 #include "stages/tracing/trace.h"
 
+#include <algorithm>
 #include <limits>
 #include <span>
 
@@ -10,6 +12,34 @@ namespace carpool::stages {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+TriangleName LastTriangle(const PathState& path) {
+  return {path.placement, path.primitive};
+}
+
+void MarkFirstLayer(PathState& path) {
+  path.first_layer = {path.placement, path.primitive, path.distance};
+}
+
+bool IsFresh(const PathState& path) {
+  return (path.flags & kPathLayerMask) == 0;
+}
+
+/// Ready for its next query; false if the next hit was at the same place as the last and is known.
+bool NeedsTracing(const TraceView& view, PathState& path) {
+  if (IsFresh(path)) return true;
+  if (NextLayerHere(view, path)) return false;
+  path.tnear = path.first_layer.distance + LayerReach(path);
+  return true;
+}
+
+/// A ray never meets the triangle that it leaves, whatever rounding says: a needle's plane may be
+/// off by far more than any bound on the origin.
+void FinishTracing(const TraceView& view, const TriangleName& left, PathState& path) {
+  if (IsFresh(path) && path.placement != kNone && left == LastTriangle(path))
+    NearestBut(view, left, path);
+  MarkFirstLayer(path);
+}
 
 // Shrinks ray.tfar to the nearest hit of `level`; true if there is one.
 bool Nearest(const TraceLevel& level, RTCRayHit& ray, PathState& path) {
@@ -26,17 +56,54 @@ bool Nearest(const TraceLevel& level, RTCRayHit& ray, PathState& path) {
   return true;
 }
 
-void NearestOfPacket(const TraceLevel& level, const int* valid, RTCRayHit8& rays,
-                     PathState* const paths[8]) {
+/// The paths of one packet; idle lanes have the first one's ray.
+template <int kSize>
+struct Packet {
+  alignas(64) int valid[kSize] = {};
+  PathState* paths[kSize];
+  int count = 0;
+
+  void Add(PathState& path) {
+    valid[count] = -1;
+    paths[count++] = &path;
+  }
+  void Clear() {
+    std::fill_n(valid, kSize, 0);
+    count = 0;
+  }
+  const PathState& Lane(int i) const { return *paths[i < count ? i : 0]; }
+};
+
+template <int kSize, class Rays, class Direction, class Far>
+void SetRays(Rays& rays, const Packet<kSize>& packet, Direction direction, Far far) {
+  for (int i = 0; i < kSize; ++i) {
+    const PathState& path = packet.Lane(i);
+    rays.org_x[i] = path.origin[0];
+    rays.org_y[i] = path.origin[1];
+    rays.org_z[i] = path.origin[2];
+    rays.dir_x[i] = direction(path)[0];
+    rays.dir_y[i] = direction(path)[1];
+    rays.dir_z[i] = direction(path)[2];
+    rays.tfar[i] = far(path);
+    rays.time[i] = 0;
+    rays.mask[i] = ~0u;
+    rays.id[i] = static_cast<unsigned>(i);
+    rays.flags[i] = 0;
+  }
+}
+
+template <int kSize, class RayHits>
+void NearestOfPacket(const TraceLevel& level, const Packet<kSize>& packet, RayHits& rays,
+                     Coherence coherence) {
   if (level.scene == nullptr) return;
-  for (int i = 0; i < 8; ++i) {
+  for (int i = 0; i < kSize; ++i) {
     rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
-  EmbreeIntersect8(valid, level.scene, &rays, Coherence::coherent);
-  for (int i = 0; i < 8; ++i) {
-    if (valid[i] == 0 || rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-    PathState& path = *paths[i];
+  EmbreeIntersect<kSize>(packet.valid, level.scene, &rays, coherence);
+  for (int i = 0; i < packet.count; ++i) {
+    if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    PathState& path = *packet.paths[i];
     path.placement = PlacementOf(level, rays.hit.instID[0][i], rays.hit.geomID[i]);
     path.primitive = rays.hit.primID[i];
     path.u = rays.hit.u[i];
@@ -45,12 +112,40 @@ void NearestOfPacket(const TraceLevel& level, const int* valid, RTCRayHit8& rays
   }
 }
 
-void MarkFirstLayer(PathState& path) {
-  path.first_layer = {path.placement, path.primitive, path.distance};
+/// Finds the nearest hits of the packet's rays.
+template <int kSize>
+void IntersectPacket(const TraceView& view, const Packet<kSize>& packet, Coherence coherence) {
+  typename EmbreePacket<kSize>::RayHit rays;
+  SetRays(
+      rays.ray, packet, [](const PathState& path) { return path.direction; },
+      [](const PathState&) { return kInfinity; });
+  for (int i = 0; i < kSize; ++i) rays.ray.tnear[i] = packet.Lane(i).tnear;
+  for (int i = 0; i < packet.count; ++i) packet.paths[i]->placement = kNone;
+  NearestOfPacket(view.opaque, packet, rays, coherence);
+  NearestOfPacket(view.transparent, packet, rays, coherence);
+}
+
+template <int kSize>
+void IntersectSlots(const TraceView& view, PathState* paths, std::span<const uint32_t> slots) {
+  Packet<kSize> packet;
+  TriangleName left[kSize];
+  for (size_t i = 0; i < slots.size(); ++i) {
+    if (i + kSize < slots.size()) __builtin_prefetch(&paths[slots[i + kSize]]);
+    PathState& path = paths[slots[i]];
+    if (NeedsTracing(view, path)) {
+      left[packet.count] = LastTriangle(path);
+      packet.Add(path);
+    }
+    if (packet.count < kSize && i + 1 < slots.size()) continue;
+    if (packet.count > 0) IntersectPacket(view, packet, Coherence::incoherent);
+    for (int k = 0; k < packet.count; ++k) FinishTracing(view, left[k], *packet.paths[k]);
+    packet.Clear();
+  }
 }
 
 // Product of what the transparent layers along the shadow ray let through.
 float Transmittance(const TraceView& view, const OpacityQuery& query, const PathState& path) {
+  if (view.transparent.scene == nullptr) return 1;
   const std::span<const LayerHit> layers = ShadowLayers(view, path);
   if (layers.size() > kMaxAlphaLayers) return 0;
   float through = 1;
@@ -61,71 +156,107 @@ float Transmittance(const TraceView& view, const OpacityQuery& query, const Path
   return through;
 }
 
+/// The shadow ray leaves a triangle that does not count, as in FinishTracing.
+bool IsOther(const TraceView& view, const PathState& path, const RTCHit& hit) {
+  return hit.primID != path.primitive ||
+         PlacementOf(view.opaque, hit.instID[0], hit.geomID) != path.placement;
+}
+
+void AddShadowed(const TraceView& view, const OpacityQuery& opacity, bool occluded,
+                 PathState& path) {
+  const float through = occluded ? 0 : Transmittance(view, opacity, path);
+  for (int c = 0; c < 3; ++c) path.radiance[c] += through * path.shadow_radiance[c];
+  path.shadow_distance = 0;
+}
+
+template <int kSize>
+void TracePacketShadows(const TraceView& view, const OpacityQuery& opacity,
+                        const Packet<kSize>& packet) {
+  typename EmbreePacket<kSize>::Ray rays;
+  SetRays(
+      rays, packet, [](const PathState& path) { return path.shadow_direction; },
+      [](const PathState& path) { return path.shadow_distance; });
+  std::fill_n(rays.tnear, kSize, 0.0f);
+  if (view.opaque.scene != nullptr) {
+    EmbreeOccluded<kSize>(packet.valid, view.opaque.scene, &rays,
+                          [&](unsigned lane, const RTCHit& hit, float) {
+                            return IsOther(view, *packet.paths[lane], hit);
+                          });
+  }
+  for (int i = 0; i < packet.count; ++i)
+    AddShadowed(view, opacity, rays.tfar[i] < 0, *packet.paths[i]);
+}
+
+template <int kSize>
+void TraceSlotShadows(const TraceView& view, const OpacityQuery& opacity, PathState* paths,
+                      std::span<const uint32_t> slots) {
+  Packet<kSize> packet;
+  for (size_t i = 0; i < slots.size(); ++i) {
+    if (i + kSize < slots.size()) __builtin_prefetch(&paths[slots[i + kSize]]);
+    packet.Add(paths[slots[i]]);
+    if (packet.count < kSize && i + 1 < slots.size()) continue;
+    TracePacketShadows(view, opacity, packet);
+    packet.Clear();
+  }
+}
+
 }  // namespace
 
 void IntersectPath(const TraceView& view, PathState& path) {
-  const bool fresh = (path.flags & kPathLayerMask) == 0;
-  if (!fresh) {
-    if (NextLayerHere(view, path)) return;
-    path.tnear = path.first_layer.distance + LayerReach(path);
-  }
-  const TriangleName left = {path.placement, path.primitive};
+  if (!NeedsTracing(view, path)) return;
+  const TriangleName left = LastTriangle(path);
   RTCRayHit ray;
   SetRay(ray.ray, path.origin, path.direction, path.tnear, kInfinity);
   path.placement = kNone;
   Nearest(view.opaque, ray, path);
   Nearest(view.transparent, ray, path);
-  // A ray never meets the triangle that it leaves, whatever rounding says: a needle's plane may be
-  // off by far more than any bound on the origin.
-  if (fresh && path.placement != kNone && left == TriangleName{path.placement, path.primitive})
-    NearestBut(view, left, path);
-  MarkFirstLayer(path);
+  FinishTracing(view, left, path);
+}
+
+void IntersectPaths(const TraceView& view, PathState* paths, std::span<const uint32_t> slots) {
+  switch (view.packet_size) {
+    case 16:
+      return IntersectSlots<16>(view, paths, slots);
+    case 8:
+      return IntersectSlots<8>(view, paths, slots);
+    default:
+      return IntersectSlots<4>(view, paths, slots);
+  }
 }
 
 void IntersectPacket(const TraceView& view, PathState* const paths[8]) {
-  alignas(32) int valid[8];
-  RTCRayHit8 rays;
+  Packet<8> packet;
   for (int i = 0; i < 8; ++i) {
-    valid[i] = paths[i] != nullptr ? -1 : 0;
-    const PathState* const p = paths[i];
-    rays.ray.org_x[i] = p != nullptr ? p->origin[0] : 0;
-    rays.ray.org_y[i] = p != nullptr ? p->origin[1] : 0;
-    rays.ray.org_z[i] = p != nullptr ? p->origin[2] : 0;
-    rays.ray.dir_x[i] = p != nullptr ? p->direction[0] : 0;
-    rays.ray.dir_y[i] = p != nullptr ? p->direction[1] : 0;
-    rays.ray.dir_z[i] = p != nullptr ? p->direction[2] : 1;
-    rays.ray.tnear[i] = p != nullptr ? p->tnear : 0;
-    rays.ray.tfar[i] = kInfinity;
-    rays.ray.time[i] = 0;
-    rays.ray.mask[i] = ~0u;
-    rays.ray.id[i] = 0;
-    rays.ray.flags[i] = 0;
-    if (paths[i] != nullptr) paths[i]->placement = -1;
+    if (paths[i] != nullptr) packet.Add(*paths[i]);
   }
-  NearestOfPacket(view.opaque, valid, rays, paths);
-  NearestOfPacket(view.transparent, valid, rays, paths);
-  for (int i = 0; i < 8; ++i) {
-    if (paths[i] != nullptr) MarkFirstLayer(*paths[i]);
-  }
+  if (packet.count == 0) return;
+  IntersectPacket(view, packet, Coherence::coherent);
+  for (int i = 0; i < packet.count; ++i) MarkFirstLayer(*packet.paths[i]);
 }
 
 void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& path) {
-  float through = 1;
+  bool occluded = false;
   if (view.opaque.scene != nullptr) {
     RTCRay ray;
     SetRay(ray, path.origin, path.shadow_direction, 0, path.shadow_distance);
-    // As in IntersectPath, the triangle that the ray leaves does not count.
-    EmbreeOccluded1(view.opaque.scene, &ray, [&](const RTCHit& hit, float) {
-      return hit.primID != path.primitive ||
-             PlacementOf(view.opaque, hit.instID[0], hit.geomID) != path.placement;
-    });
-    if (ray.tfar < 0) through = 0;
+    EmbreeOccluded1(
+        view.opaque.scene, &ray,
+        [&](unsigned, const RTCHit& hit, float) { return IsOther(view, path, hit); });
+    occluded = ray.tfar < 0;
   }
-  if (through > 0 && view.transparent.scene != nullptr) {
-    through = Transmittance(view, opacity, path);
+  AddShadowed(view, opacity, occluded, path);
+}
+
+void TraceShadows(const TraceView& view, const OpacityQuery& opacity, PathState* paths,
+                  std::span<const uint32_t> slots) {
+  switch (view.packet_size) {
+    case 16:
+      return TraceSlotShadows<16>(view, opacity, paths, slots);
+    case 8:
+      return TraceSlotShadows<8>(view, opacity, paths, slots);
+    default:
+      return TraceSlotShadows<4>(view, opacity, paths, slots);
   }
-  for (int c = 0; c < 3; ++c) path.radiance[c] += through * path.shadow_radiance[c];
-  path.shadow_distance = 0;
 }
 
 }  // namespace carpool::stages

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "stages/tables/geometry_view.h"
 #include "stages/tables/path.h"
@@ -23,6 +24,7 @@ struct TraceView {
   TraceLevel opaque;
   TraceLevel transparent;
   GeometryView geometry;  // tells which triangles are neighbours
+  int packet_size = 4;    // of IntersectPaths and TraceShadows: 4, 8 or 16
 };
 
 /// What stands at (placement, primitive, u, v) lets `1 - opacity` of a shadow ray through. Called
@@ -39,6 +41,10 @@ struct OpacityQuery {
 /// Deterministic: the same ray gives the same hit in every executor.
 void IntersectPath(const TraceView& view, PathState& path);
 
+/// Does the same for the paths in these slots, as packets: bit for bit what each path alone would
+/// get, because packets that are not COHERENT go through the same arithmetic as single rays.
+void IntersectPaths(const TraceView& view, PathState* paths, std::span<const uint32_t> slots);
+
 /// Eight camera rays of a fixed 4x2 pixel group, as one coherent packet. Null entries are skipped.
 /// Within a packet, mates can change each other's hits in the last bit; groups are therefore the
 /// same in every executor.
@@ -47,5 +53,9 @@ void IntersectPacket(const TraceView& view, PathState* const paths[8]);
 /// Traces the path's shadow ray and adds its contribution, times what transparent layers let
 /// through.
 void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& path);
+
+/// Does the same for the paths in these slots, as packets, bit for bit.
+void TraceShadows(const TraceView& view, const OpacityQuery& opacity, PathState* paths,
+                  std::span<const uint32_t> slots);
 
 }  // namespace carpool::stages
