@@ -41,7 +41,7 @@ void BlockingWorker::perform(std::uint64_t virtual_ticks) {
 }
 
 void BlockingWorker::publish(const Block& block, FlushCause cause) {
-  runner_.credits().settle(runner_.open().take_spent(), 0);  // before: see Worker::publish
+  runner_.credits().charge(runner_.open().take_spent());  // before: see Worker::publish
   runner_.stats().stages[block.stage].published.add(block.items);
   Block kept = block;
   if (!runner_.keep(kept, cause)) {

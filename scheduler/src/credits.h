@@ -51,16 +51,25 @@ class CreditCache {
       : purse_(purse),
         most_(std::min<std::int64_t>(4096, purse.limit() / (2 * std::int64_t{workers}))) {}
 
-  // settle books a call that spent `spent` credits on what it emitted and got `freed` from what it
-  // consumed.
+  // charge books `spent` credits, on what a call has emitted so far. It gives nothing back: what is
+  // left in the pocket may be reserved for what the call has yet to emit.
+  void charge(std::int64_t spent) {
+    pocket_ -= spent;
+    if (pocket_ < 0) {
+      note_lent(purse_.take(-pocket_));
+      pocket_ = 0;
+    }
+  }
+
+  // settle books the end of a call that spent `spent` credits on what it emitted and got `freed`
+  // from what it consumed.
   void settle(std::int64_t spent, std::int64_t freed) {
     pocket_ += freed - spent;
     if (pocket_ > most_) {
       purse_.give(pocket_ - most_ / 2);
       pocket_ = most_ / 2;
-    } else if (pocket_ < 0) {
-      note_lent(purse_.take(-pocket_));
-      pocket_ = 0;
+    } else {
+      charge(0);
     }
   }
 

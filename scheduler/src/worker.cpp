@@ -426,7 +426,7 @@ void Worker::share() {
 void Worker::publish(const Block& block, FlushCause cause) {
   // Before others can retire these items: what they give back must have been taken, or a source
   // would find credits that nobody has given back yet.
-  runner_.credits().settle(runner_.open().take_spent(), 0);
+  runner_.credits().charge(runner_.open().take_spent());
   if (plain_) {
     push_ready(block, cause);
     return;

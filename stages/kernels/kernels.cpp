@@ -26,10 +26,7 @@ void Camera(const KernelContext& c, PathState* paths, std::span<const uint32_t> 
 
 template <class D>
 void Shade(const KernelContext& c, PathState* paths, std::span<const uint32_t> slots, Next* next) {
-  const D d;
-  for (size_t i = 0; i < slots.size(); i += hn::Lanes(d)) {
-    ShadeLanes(d, c, LoadSlots(d, paths, slots.data() + i, slots.size() - i), next + i);
-  }
+  ShadePaths(D(), c, paths, slots, next);
 }
 
 template <class D>

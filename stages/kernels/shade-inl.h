@@ -10,6 +10,8 @@
 #define CARPOOL_STAGES_KERNELS_SHADE_INL_H_
 #endif
 
+#include <algorithm>
+#include <span>
 #include <utility>
 
 #include "stages/kernels/bsdf-inl.h"
@@ -388,10 +390,26 @@ HWY_INLINE void EndPaths(D d, const Vertex<D>& v, Mask<D> lanes, Next* next) {
   for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
 }
 
+/// One vector of paths on its way through the steps of shading.
 template <class D>
-HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p, Next* next) {
-  Vertex<D> v = LoadVertex(d, c, p);
+struct Shading {
+  Mask<D> active;  // lanes that have a next step
+  bool ended;      // none has
+  Vertex<D> v;
+  Vec3<D> base_color;
+  Scatter<D> s;
+  ShadowRay<D> shadow;
+};
+
+/// What was hit: transparency, emission, and who ends there.
+template <class D>
+HWY_INLINE void Arrive(D d, const KernelContext& c, const PathLanes<D>& p, Shading<D>& w,
+                       Next* next) {
+  Vertex<D>& v = w.v;
+  v = LoadVertex(d, c, p);
   const Rgba<D> base = BaseColor(d, c, v.at, v.footprint, p.active);
+  w.base_color = base.rgb;
+  w.ended = true;
 
   const Mask<D> passes = PassesThrough(d, v, base.a, p.active);
   if (!hn::AllFalse(d, passes)) ContinueThrough(d, v, passes, next);
@@ -409,18 +427,91 @@ HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p,
   const Mask<D> deep = AtLeast(d, v.depth, c.max_depth);
   const Mask<D> ends = hn::And(active, hn::Or(unlit, deep));
   if (!hn::AllFalse(d, ends)) EndPaths(d, v, ends, next);
-  active = hn::AndNot(ends, active);
-  if (hn::AllFalse(d, active)) return;
+  w.active = hn::AndNot(ends, active);
+  w.ended = hn::AllFalse(d, w.active);
+}
 
-  Scatter<D> s;
+/// The frame and the lobes there.
+template <class D>
+HWY_INLINE void Prepare(D d, const KernelContext& c, Shading<D>& w) {
+  const Vertex<D>& v = w.v;
+  Scatter<D>& s = w.s;
   s.origin = OffsetOrigin(d, v.surface);
   s.packed_normal = EncodeNormal(d, v.surface.shading);
   s.frame = MakeFrame(d, v.surface.shading);
   s.wo = ToLocal(s.frame, v.toward);
-  s.bsdf = PrepareBsdf(d, c.bsdf, MaterialParams(d, c, v, base.rgb, active), s.wo);
-  const ShadowRay<D> shadow = NextEvent(d, c, v, s, active);
-  const Bounce<D> bounce = SampleBounce(d, c, v, s, active);
-  StoreVertex(d, v, s, shadow, bounce, active, next);
+  s.bsdf = PrepareBsdf(d, c.bsdf, MaterialParams(d, c, v, w.base_color, w.active), s.wo);
+}
+
+template <class D>
+HWY_INLINE void Connect(D d, const KernelContext& c, Shading<D>& w) {
+  w.shadow = NextEvent(d, c, w.v, w.s, w.active);
+}
+
+template <class D>
+HWY_INLINE void Leave(D d, const KernelContext& c, const Shading<D>& w, Next* next) {
+  const Bounce<D> bounce = SampleBounce(d, c, w.v, w.s, w.active);
+  StoreVertex(d, w.v, w.s, w.shadow, bounce, w.active, next);
+}
+
+/// All steps of one vector.
+template <class D>
+HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p, Next* next) {
+  Shading<D> w;
+  Arrive(d, c, p, w, next);
+  if (w.ended) return;
+  Prepare(d, c, w);
+  Connect(d, c, w);
+  Leave(d, c, w, next);
+}
+
+template <class D>
+HWY_NOINLINE void ArriveAll(D d, const KernelContext& c, PathState* paths,
+                            std::span<const uint32_t> slots, Shading<D>* w, Next* next) {
+  for (size_t i = 0; i < slots.size(); i += hn::Lanes(d)) {
+    Arrive(d, c, LoadSlots(d, paths, slots.data() + i, slots.size() - i), *w++, next + i);
+  }
+}
+template <class D>
+HWY_NOINLINE void PrepareAll(D d, const KernelContext& c, std::span<Shading<D>> all) {
+  for (Shading<D>& w : all) {
+    if (!w.ended) Prepare(d, c, w);
+  }
+}
+template <class D>
+HWY_NOINLINE void ConnectAll(D d, const KernelContext& c, std::span<Shading<D>> all) {
+  for (Shading<D>& w : all) {
+    if (!w.ended) Connect(d, c, w);
+  }
+}
+template <class D>
+HWY_NOINLINE void LeaveAll(D d, const KernelContext& c, std::span<Shading<D>> all, Next* next) {
+  for (Shading<D>& w : all) {
+    if (!w.ended) Leave(d, c, w, next);
+    next += hn::Lanes(d);
+  }
+}
+
+/// Step by step, a few vectors each: the whole of shading is more code than fits the first-level
+/// instruction cache.
+template <class D>
+HWY_INLINE void ShadePaths(D d, const KernelContext& c, PathState* paths,
+                           std::span<const uint32_t> slots, Next* next) {
+  if constexpr (hn::MaxLanes(D()) == 1) {
+    for (size_t i = 0; i < slots.size(); ++i)
+      ShadeLanes(d, c, LoadSlots(d, paths, slots.data() + i, 1), next + i);
+  } else {
+    constexpr size_t kPaths = 64;  // what is between the steps fits the second-level cache
+    Shading<D> work[kPaths / hn::MaxLanes(D())];
+    for (; !slots.empty(); slots = slots.subspan(std::min(kPaths, slots.size())), next += kPaths) {
+      const auto some = slots.first(std::min(kPaths, slots.size()));
+      ArriveAll(d, c, paths, some, work, next);
+      const std::span<Shading<D>> all(work, (some.size() + hn::Lanes(d) - 1) / hn::Lanes(d));
+      PrepareAll(d, c, all);
+      ConnectAll(d, c, all);
+      LeaveAll(d, c, all, next);
+    }
+  }
 }
 
 /// Paths that left the scene gather the environment, weighted against light sampling, and end.

@@ -33,9 +33,9 @@ struct FilterContext {
     const unsigned n = arguments->N;
     for (unsigned i = 0; i < n; ++i) {
       if (arguments->valid[i] == 0) continue;
-      const bool accepted = self->accept(RTCRayN_id(arguments->ray, n, i),
-                                         rtcGetHitFromHitN(arguments->hit, n, i),
-                                         RTCRayN_tfar(arguments->ray, n, i));
+      const bool accepted =
+          self->accept(RTCRayN_id(arguments->ray, n, i), rtcGetHitFromHitN(arguments->hit, n, i),
+                       RTCRayN_tfar(arguments->ray, n, i));
       if (!accepted) arguments->valid[i] = 0;
     }
   }

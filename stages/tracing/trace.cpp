@@ -239,9 +239,8 @@ void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& 
   if (view.opaque.scene != nullptr) {
     RTCRay ray;
     SetRay(ray, path.origin, path.shadow_direction, 0, path.shadow_distance);
-    EmbreeOccluded1(
-        view.opaque.scene, &ray,
-        [&](unsigned, const RTCHit& hit, float) { return IsOther(view, path, hit); });
+    EmbreeOccluded1(view.opaque.scene, &ray,
+                    [&](unsigned, const RTCHit& hit, float) { return IsOther(view, path, hit); });
     occluded = ray.tfar < 0;
   }
   AddShadowed(view, opacity, occluded, path);

@@ -263,4 +263,18 @@ TEST(CreditsTest, WhatAPocketHoldsIsNotFreeWhileThePurseIsInDebt) {
   EXPECT_EQ(mine.reserve(3, 20), 20);
 }
 
+TEST(CreditsTest, WhatACallHasReservedStaysWithIt) {
+  carpool::Credits purse(100);
+  carpool::CreditCache mine(purse, 2);
+  carpool::CreditCache other(purse, 2);
+  EXPECT_EQ(mine.reserve(3, 90), 90);
+  mine.charge(0);  // the call publishes what an earlier one had left open
+  mine.charge(30);
+  EXPECT_EQ(mine.pocket(), 60);
+  EXPECT_EQ(other.reserve(11, 90), 0) << "or both would emit for the same credits";
+  mine.settle(10, 0);  // the end of the call: the rest may go
+  EXPECT_EQ(mine.pocket() + purse.available(), 60);
+  EXPECT_GE(purse.available(), 20);
+}
+
 }  // namespace
