@@ -30,6 +30,8 @@ def carpool(case, flags, samples, seed, output):
     command = [os.path.join(ROOT, "build/release/bin/carpool"), "render", case["scene"], "-o", output, "--quiet"]
     command += ["--no-png", "--stats", stats, "--size", f"{flags.width}x{flags.height}", "--depth", str(flags.depth)]
     command += ["--samples", str(samples), "--seed", str(seed), "--threads", str(flags.threads)]
+    if flags.no_roulette:
+        command += ["--roulette", str(flags.depth)]
     for name in ("env", "camera"):
         if case[name]:
             command += ["--" + name, case[name]]
@@ -57,6 +59,7 @@ def measure(case, flags, folder):
     view = carpool(case, flags, 1, 0, at("carpool", "view"))["view"]
     job = {"scene": case["scene"], "view": view, "environment": case["env"]}
     job.update(width=flags.width, height=flags.height, depth=flags.depth, threads=flags.threads)
+    job["roulette"] = not flags.no_roulette
 
     def cycles(wanted):
         return blender(folder, {**job, "renders": wanted})
@@ -147,6 +150,7 @@ def parse():
     parser.add_argument("--samples", type=int, default=16)
     parser.add_argument("--reference", type=int, default=256, help="samples of the images that errors are taken from")
     parser.add_argument("--depth", type=int, default=8, help="scattering vertices")
+    parser.add_argument("--no-roulette", action="store_true", help="both follow every path to the full depth")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--json", default="", help="also write the rows to this file")
@@ -171,8 +175,12 @@ def cases_of(flags):
 def main():
     flags = parse()
     rows = []
-    print("Cycles: CPU, no clamps, no glossy filter, no adaptive sampling, no denoising, its own Russian roulette from the")
-    print("first bounce on; Carpool: the default executor, roulette after three vertices. Medians; sampling time alone.")
+    print("Cycles: CPU, no clamps, no glossy filter, no adaptive sampling, no denoising. Carpool: the default executor.")
+    if flags.no_roulette:
+        print("Russian roulette in neither.")
+    else:
+        print("Russian roulette: Cycles' own from the first bounce on, Carpool's after three vertices.")
+    print("Medians; sampling time alone.")
     for case in cases_of(flags):
         if not os.path.exists(case["scene"]):
             print(f"{case['label']}: skipped, there is no {case['scene']}")

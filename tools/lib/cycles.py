@@ -124,6 +124,9 @@ def settle(scene, job):
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = bounces
     cycles.transmission_bounces = bounces
     cycles.transparent_max_bounces = 1024
+    if not job["roulette"]:
+        cycles.min_light_bounces = bounces + 1
+        cycles.min_transparent_bounces = 1024
 
 
 def render(scene, samples, seed, output):
