@@ -90,6 +90,12 @@ inline void EmbreeOccluded1(RTCScene scene, RTCRay* ray) {
   rtcInitOccludedArguments(&arguments);
   rtcOccluded1(scene, ray, &arguments);
 }
+template <int kSize>
+void EmbreeOccluded(const int* valid, RTCScene scene, typename EmbreePacket<kSize>::Ray* rays) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  EmbreePacket<kSize>::kOccluded(valid, scene, rays, &arguments);
+}
 template <class Accept>
 RTCOccludedArguments FilteredArguments(FilterContext<Accept>& context) {
   rtcInitRayQueryContext(&context.embree);
@@ -139,6 +145,11 @@ void EmbreeIntersect(const int* valid, RTCScene scene, typename EmbreePacket<kSi
 inline void EmbreeOccluded1(RTCScene scene, RTCRay* ray) {
   RTCIntersectContext context = IntersectContext(Coherence::incoherent);
   rtcOccluded1(scene, &context, ray);
+}
+template <int kSize>
+void EmbreeOccluded(const int* valid, RTCScene scene, typename EmbreePacket<kSize>::Ray* rays) {
+  RTCIntersectContext context = IntersectContext(Coherence::incoherent);
+  EmbreePacket<kSize>::kOccluded(valid, scene, &context, rays);
 }
 template <class Accept>
 void EmbreeOccluded1(RTCScene scene, RTCRay* ray, Accept accept) {

@@ -44,8 +44,9 @@ std::string Bar(double value, double most, const char* kind) {
 std::string SpeedChart(const std::vector<SceneFigures>& scenes) {
   std::string out =
       "<h2>Of what bare Embree does with the same rays</h2>\n<p>Embree replays all rays of the "
-      "render and nothing else, in the faster of two orders: as they came, or sorted (sorting "
-      "counted). Blue: the wavefront, red where it loses to the megakernel. Grey: the megakernel, "
+      "render and nothing else, in the fastest of four ways: one by one or in packets, as they "
+      "came or sorted (sorting counted). Blue: the wavefront, red where it loses to the "
+      "megakernel. Grey: the megakernel, "
       "from the same kernels at one lane.\n<table>\n<tr><th>scene<th>share of Embree"
       "<th>wavefront<th>megakernel<th>wavefront / megakernel<th>least..most\n";
   for (const SceneFigures& f : scenes) {

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <limits>
+#include <type_traits>
 
 #include "stages/simd/denormals.h"
 
@@ -160,6 +161,71 @@ void ReplayShadow(const stages::TraceView& view, const RecordedRay& r) {
   }
 }
 
+template <int kSize, class Rays>
+void SetRays(Rays& rays, const RecordedRay* first, size_t count) {
+  for (size_t i = 0; i < kSize; ++i) {
+    const RecordedRay& r = first[std::min(i, count - 1)];
+    rays.org_x[i] = r.origin[0];
+    rays.org_y[i] = r.origin[1];
+    rays.org_z[i] = r.origin[2];
+    rays.dir_x[i] = r.direction[0];
+    rays.dir_y[i] = r.direction[1];
+    rays.dir_z[i] = r.direction[2];
+    rays.tnear[i] = r.tnear;
+    rays.tfar[i] = r.tfar;
+    rays.time[i] = 0;
+    rays.mask[i] = ~0u;
+    rays.id[i] = 0;
+    rays.flags[i] = 0;
+  }
+}
+
+/// Calls trace(first, count, valid) for each packet of the rays.
+template <int kSize, class Trace>
+void InPackets(const RecordedRay* rays, size_t count, const Trace& trace) {
+  for (size_t i = 0; i < count; i += kSize) {
+    const size_t some = std::min<size_t>(kSize, count - i);
+    alignas(64) int valid[kSize] = {};
+    std::fill_n(valid, some, -1);
+    trace(rays + i, some, valid);
+  }
+}
+
+template <int kSize>
+void ReplayBouncePackets(const stages::TraceView& view, const RecordedRay* rays, size_t count) {
+  InPackets<kSize>(rays, count, [&](const RecordedRay* first, size_t some, const int* valid) {
+    for (RTCScene scene : {view.opaque.scene, view.transparent.scene}) {
+      if (scene == nullptr) continue;
+      typename stages::EmbreePacket<kSize>::RayHit hits;
+      SetRays<kSize>(hits.ray, first, some);
+      std::fill_n(hits.hit.geomID, kSize, RTC_INVALID_GEOMETRY_ID);
+      std::fill_n(hits.hit.instID[0], kSize, RTC_INVALID_GEOMETRY_ID);
+      stages::EmbreeIntersect<kSize>(valid, scene, &hits, stages::Coherence::incoherent);
+    }
+  });
+}
+
+template <int kSize>
+void ReplayShadowPackets(const stages::TraceView& view, const RecordedRay* rays, size_t count) {
+  InPackets<kSize>(rays, count, [&](const RecordedRay* first, size_t some, int* valid) {
+    typename stages::EmbreePacket<kSize>::Ray packet;
+    SetRays<kSize>(packet, first, some);
+    if (view.opaque.scene != nullptr)
+      stages::EmbreeOccluded<kSize>(valid, view.opaque.scene, &packet);
+    if (view.transparent.scene == nullptr) return;
+    for (size_t i = 0; i < some; ++i) valid[i] = packet.tfar[i] < 0 ? 0 : -1;
+    stages::EmbreeOccluded<kSize>(valid, view.transparent.scene, &packet);
+  });
+}
+
+/// `by_size(std::integral_constant<int, N>)` with the packets that the machine has.
+template <class BySize>
+void WithPacketSize(int size, const BySize& by_size) {
+  if (size == 16) return by_size(std::integral_constant<int, 16>());
+  if (size == 8) return by_size(std::integral_constant<int, 8>());
+  by_size(std::integral_constant<int, 4>());
+}
+
 }  // namespace
 
 RayLog RecordRays(const KernelContext& context, const stages::Kernels& kernels, uint32_t samples) {
@@ -174,7 +240,7 @@ RayLog RecordRays(const KernelContext& context, const stages::Kernels& kernels, 
   return log;
 }
 
-double Replay(const stages::TraceView& view, const RayLog& log, bool sorted,
+double Replay(const stages::TraceView& view, const RayLog& log, const ReplayWay& way,
               tbb::task_arena& arena) {
   std::vector<RecordedRay> bounce = log.bounce, shadow = log.shadow;
   std::vector<PathState> camera = log.camera;
@@ -195,10 +261,21 @@ double Replay(const stages::TraceView& view, const RayLog& log, bool sorted,
     });
     constexpr size_t kSortWindow = size_t{1} << 18;
     for (std::vector<RecordedRay>* rays : {&bounce, &shadow}) {
-      if (sorted)
+      if (way.sorted)
         in_chunks(rays->size(), kSortWindow, [&](size_t first, size_t last) {
           SortWindow(rays->data() + first, last - first);
         });
+    }
+    if (way.packets) {
+      WithPacketSize(view.packet_size, [&](auto size) {
+        in_chunks(bounce.size(), 512, [&](size_t first, size_t last) {
+          ReplayBouncePackets<size()>(view, &bounce[first], last - first);
+        });
+        in_chunks(shadow.size(), 512, [&](size_t first, size_t last) {
+          ReplayShadowPackets<size()>(view, &shadow[first], last - first);
+        });
+      });
+      return;
     }
     in_chunks(bounce.size(), 512, [&](size_t first, size_t last) {
       for (size_t i = first; i < last; ++i) ReplayBounce(view, bounce[i]);

@@ -27,10 +27,14 @@ struct RayLog {
 RayLog RecordRays(const stages::KernelContext& context, const stages::Kernels& kernels,
                   uint32_t samples);
 
-/// Seconds to replay on the threads of `arena`: camera rays as coherent packets, the others as
-/// single rays. With `sorted`, bounce and shadow rays are sorted first by direction octant and
-/// Morton code of the origin, in windows of 256k, and the sorting is counted.
-double Replay(const stages::TraceView& view, const RayLog& log, bool sorted,
+struct ReplayWay {
+  bool packets;  // bounce and shadow rays: as wide as the machine has them, else one by one
+  bool sorted;   // ... by direction octant and Morton code of the origin, in windows of 256k
+};
+
+/// Seconds to replay on the threads of `arena`, with the sorting; camera rays always as coherent
+/// packets.
+double Replay(const stages::TraceView& view, const RayLog& log, const ReplayWay& way,
               tbb::task_arena& arena);
 
 }  // namespace carpool::tools

@@ -67,17 +67,22 @@ void MeasureRounds(const BenchOptions& o, render::Workspace& w, render::Workspac
   Track wave{w.executor()}, mega{*megakernel}, fast{loose.executor()}, one{*one_lane};
   const stages::CameraPass pass{.sample_count = static_cast<uint32_t>(o.samples)};
   const RayLog log = RecordRays(w.context(), w.kernels(), pass.sample_count);
-  std::vector<double> plain, sorted, over_mega, price, gain, share, idle;
+  std::vector<double> plain, sorted, packets, sorted_packets, over_mega, price, gain, share, idle;
   const auto speed = [&](double seconds) {
     return static_cast<double>(log.total()) / seconds / 1e6;
   };
   for (int round = 0; round < o.rounds + 1; ++round) {
     for (Track* track : {&mega, &wave, &one, &fast}) track->Run(pass, round > 0);
-    const double in_order = Replay(w.context().trace, log, false, *options.arena);
-    const double in_windows = Replay(w.context().trace, log, true, *options.arena);
+    const auto replay = [&](bool packets, bool in_windows) {
+      return speed(Replay(w.context().trace, log, {packets, in_windows}, *options.arena));
+    };
+    const double replays[4] = {replay(false, false), replay(false, true), replay(true, false),
+                               replay(true, true)};
     if (round == 0) continue;
-    plain.push_back(speed(in_order));
-    sorted.push_back(speed(in_windows));
+    plain.push_back(replays[0]);
+    sorted.push_back(replays[1]);
+    packets.push_back(replays[2]);
+    sorted_packets.push_back(replays[3]);
     over_mega.push_back(mega.last.seconds / wave.last.seconds);
     gain.push_back(ShadingCost(one.last.schedule) / ShadingCost(wave.last.schedule));
     price.push_back(wave.last.seconds / fast.last.seconds);
@@ -89,6 +94,8 @@ void MeasureRounds(const BenchOptions& o, render::Workspace& w, render::Workspac
   f.mega = Median(mega.mega_rays);
   f.embree_plain = Median(plain);
   f.embree_sorted = Median(sorted);
+  f.embree_packets = Median(packets);
+  f.embree_sorted_packets = Median(sorted_packets);
   f.over_mega = Median(over_mega);
   f.least_over_mega = *std::min_element(over_mega.begin(), over_mega.end());
   f.most_over_mega = *std::max_element(over_mega.begin(), over_mega.end());
@@ -172,6 +179,9 @@ std::vector<Row> RowsOf(const SceneFigures& f) {
   add("megakernel", f.mega, "M rays/s");
   add("bare Embree, rays as they came", f.embree_plain, "M rays/s");
   add("bare Embree, rays sorted", f.embree_sorted, "M rays/s");
+  add("bare Embree, packets as they came", f.embree_packets, "M rays/s");
+  add("bare Embree, packets of sorted rays", f.embree_sorted_packets, "M rays/s");
+  add("wavefront over bare Embree's single rays", f.wave / f.EmbreeSingles(), "x");
   add("wavefront over bare Embree", f.WaveOverEmbree(), "x", ">= 0.5", f.WaveOverEmbree() >= 0.5);
   add("megakernel over bare Embree", f.MegaOverEmbree(), "x");
   add("time with ROBUST over without", f.robust_price, "x");

@@ -2,6 +2,7 @@
 // ladder.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <string>
@@ -34,11 +35,12 @@ struct SceneFigures {
   SceneCase scene;
   std::string isa;
   int threads = 0;
-  double load_seconds = 0, bvh_seconds = 0;        // load: everything before the BVH
-  double wave = 0, mega = 0;                       // M rays/s
-  double embree_plain = 0, embree_sorted = 0;      // M rays/s of the same rays in bare Embree
-  double over_mega = 0;                            // wavefront's speed / megakernel's
-  double least_over_mega = 0, most_over_mega = 0;  // of all rounds
+  double load_seconds = 0, bvh_seconds = 0;    // load: everything before the BVH
+  double wave = 0, mega = 0;                   // M rays/s
+  double embree_plain = 0, embree_sorted = 0;  // M rays/s of the same rays in bare Embree ...
+  double embree_packets = 0, embree_sorted_packets = 0;  // ... and in packets
+  double over_mega = 0;                                  // wavefront's speed / megakernel's
+  double least_over_mega = 0, most_over_mega = 0;        // of all rounds
   double robust_price = 0;     // seconds with Embree's ROBUST flag / without, wavefront
   double film_price = 0;       // exact sums instead of floats, as a share of the wavefront's time
   double shading_gain = 0;     // time of the shading stage at one lane / at full width
@@ -50,7 +52,10 @@ struct SceneFigures {
   RunReport schedule;                           // of the wavefront's last round
   std::optional<render::LadderReport> ladder;
 
-  double Embree() const { return std::max(embree_plain, embree_sorted); }
+  double EmbreeSingles() const { return std::max(embree_plain, embree_sorted); }
+  double Embree() const {
+    return std::max({EmbreeSingles(), embree_packets, embree_sorted_packets});
+  }
   double WaveOverEmbree() const { return wave / Embree(); }
   double MegaOverEmbree() const { return mega / Embree(); }
 };
