@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <utility>
 
 #include <tbb/blocked_range.h>
@@ -63,6 +64,7 @@ Result carpool_run(const Work& work, const Setup& setup) {
 
 Result carpool_run(const Work& work, const Setup& setup, carpool::RunReport& report) {
   std::vector<Result> parts(static_cast<std::size_t>(setup.threads));
+  std::vector<std::vector<Item>> scratch(parts.size(), std::vector<Item>(256));  // of each worker
   carpool::Graph graph;
   std::vector<carpool::StageHandle<Item>> stages;
   for (std::uint32_t s = 0; s < work.stages; ++s) {
@@ -70,19 +72,25 @@ Result carpool_run(const Work& work, const Setup& setup, carpool::RunReport& rep
         graph.add_stage<Item>({.name = "stage", .bins = work.keys, .rank = static_cast<int>(s)}));
   }
   for (const auto stage : stages) {
+    // Two loops: the first is what the waves do, and no branch in it waits for a hash.
     graph.set_kernel(stage, [&](const carpool::Batch<Item>& batch, carpool::Emitter& out) {
       const Work here = work;  // items are bytes to the compiler, which could be those of `work`
+      Item* const moving = scratch[batch.worker].data();
+      std::size_t count = 0;
       Result part;
       part.visits = batch.items.size();
       for (Item item : batch.items) {
         visit(here, item);
         if (item.left > 0) {
-          out.emit(stages[stage_of(here, item.hash)], key_of(here, item.hash), item);
+          moving[count++] = item;
         } else {
           part.retire(item);
         }
       }
       parts[batch.worker] += part;
+      out.emit_each(std::span(moving, count), [&, to = stages.data()](const Item& item) {
+        return std::pair(to[stage_of(here, item.hash)], key_of(here, item.hash));
+      });
     });
   }
   std::atomic<std::uint64_t> next{0};

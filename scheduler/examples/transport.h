@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,8 @@
 #include "carpool/carpool.h"
 
 namespace transport {
+
+inline constexpr std::uint32_t kBlock = 256;  // particles in a batch, at most
 
 struct Layer {
   double end;         // depth at which it ends, in mean free paths of a unit cross-section
@@ -85,7 +88,13 @@ struct Medium : Layer {
     return 0;
   }
 
-  // fly_without_branch does the same, for many particles that do not wait for each other.
+  // The same two for many particles that do not wait for each other: an outcome is data, not a
+  // branch that nobody could foresee.
+  bool survives_without_branch(Particle& particle) const {
+    const double chance = random(particle);
+    particle.cosine = 2 * random(particle) - 1;
+    return chance < scattering;
+  }
   int fly_without_branch(Particle& particle) const {
     const double to = destination(particle);
     particle.depth = std::min(std::max(to, begin), end);
@@ -157,48 +166,72 @@ inline Tally by_history_parallel(const Slab& slab, std::uint32_t count, std::uin
   });
 }
 
-// The event-based version: the same functions, as a graph of two stages. An event is what happens
-// to a particle in one place, and the flight to the next.
+// Where the particles of a batch go: back, on, or to a collision where they are; or nowhere.
+class Outcomes {
+ public:
+  enum Where : std::uint32_t { back, collision, on, absorbed, kCount };
+
+  void add(std::uint32_t where, const Particle& particle) {
+    lists_[where][counts_[where]++] = particle;
+  }
+  std::uint32_t count(Where where) const { return counts_[where]; }
+  std::span<const Particle> list(Where where) const {
+    return std::span(lists_[where]).first(counts_[where]);
+  }
+
+ private:
+  std::array<std::uint32_t, kCount> counts_{};
+  std::array<std::array<Particle, kBlock>, kCount> lists_;
+};
+
+// The event-based version: the same physics, as a graph of two stages. An event is what happens to
+// a particle in one place, and the flight to the next. The medium is the same for a whole batch,
+// and no particle waits for another: that is what events have over histories.
 inline Tally by_event(const Slab& slab, std::uint32_t count, std::uint32_t threads,
                       bool print_report) {
   std::vector<Tally> tallies(4096);
   carpool::Graph graph;
-  const auto enter = graph.add_stage<Particle>({.name = "enter", .bins = slab.layers()});
-  const auto collide =
-      graph.add_stage<Particle>({.name = "collide", .bins = slab.layers(), .rank = 1});
-  // Where a particle goes next is data, not a branch that nobody could foresee, and the medium is
-  // the same for the whole batch: that is what events have over histories.
-  const std::array next_stage{collide, enter};
-  const auto fly = [next_stage, layers = slab.layers()](const Medium& medium, std::uint32_t layer,
-                                                        Particle& particle, Tally& tally,
-                                                        carpool::Emitter& out) {
-    const int step = medium.fly_without_branch(particle);
-    const std::uint32_t to = layer + static_cast<std::uint32_t>(step);
-    if (to < layers) {
-      out.emit(next_stage[step != 0], to, particle);
+  const auto enter =
+      graph.add_stage<Particle>({.name = "enter", .bins = slab.layers(), .block_items = kBlock});
+  const auto collide = graph.add_stage<Particle>(
+      {.name = "collide", .bins = slab.layers(), .block_items = kBlock, .rank = 1});
+  const auto hand_on = [=, last = slab.layers() - 1](const Outcomes& outcomes, std::uint32_t layer,
+                                                     Tally& tally, carpool::Emitter& out) {
+    out.emit(collide, layer, outcomes.list(Outcomes::collision));
+    if (layer > 0) {
+      out.emit(enter, layer - 1, outcomes.list(Outcomes::back));
     } else {
-      ++(step < 0 ? tally.reflected : tally.transmitted);
+      tally.reflected += outcomes.count(Outcomes::back);
+    }
+    if (layer < last) {
+      out.emit(enter, layer + 1, outcomes.list(Outcomes::on));
+    } else {
+      tally.transmitted += outcomes.count(Outcomes::on);
     }
   };
   graph.set_kernel(enter, [&](const carpool::Batch<Particle>& batch, carpool::Emitter& out) {
     const Medium medium = slab.medium(batch.bin);
-    Tally tally;
+    Outcomes outcomes;
     for (Particle particle : batch.items) {
-      fly(medium, batch.bin, particle, tally, out);
+      const int step = medium.fly_without_branch(particle);
+      outcomes.add(static_cast<std::uint32_t>(Outcomes::collision + step), particle);
     }
-    tallies[batch.worker] += tally;
+    hand_on(outcomes, batch.bin, tallies[batch.worker], out);
   });
   graph.set_kernel(collide, [&](const carpool::Batch<Particle>& batch, carpool::Emitter& out) {
     const Medium medium = slab.medium(batch.bin);
-    Tally tally{.collisions = batch.items.size()};
+    Outcomes outcomes;
     for (Particle particle : batch.items) {
-      if (medium.survives(particle)) {
-        fly(medium, batch.bin, particle, tally, out);
-      } else {
-        ++tally.absorbed;
-      }
+      const bool survives = medium.survives_without_branch(particle);
+      const int step = medium.fly_without_branch(particle);
+      const auto where = static_cast<std::uint32_t>(Outcomes::collision + step);
+      const auto absorbed = Outcomes::absorbed * static_cast<std::uint32_t>(!survives);
+      outcomes.add(where | absorbed, particle);  // `absorbed` has all bits; a ?: would be a branch
     }
-    tallies[batch.worker] += tally;
+    Tally& tally = tallies[batch.worker];
+    tally.collisions += batch.items.size();
+    tally.absorbed += outcomes.count(Outcomes::absorbed);
+    hand_on(outcomes, batch.bin, tally, out);
   });
   std::atomic<std::uint32_t> next{0};
   const auto beam = graph.add_source(
@@ -211,9 +244,9 @@ inline Tally by_event(const Slab& slab, std::uint32_t count, std::uint32_t threa
                                           : carpool::SourceStatus::exhausted;
       });
   graph.add_edge(beam, enter);
-  for (const auto stage : next_stage) {
-    graph.add_edge(enter, stage);
-    graph.add_edge(collide, stage);
+  for (const auto to : {enter, collide}) {
+    graph.add_edge(enter, to);
+    graph.add_edge(collide, to);
   }
   const carpool::RunReport report = carpool::run(graph, {.threads = threads, .in_flight = 32768});
   if (print_report) {

@@ -1,8 +1,10 @@
 // What the manual promises, feature by feature.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "carpool/carpool.h"
@@ -98,6 +100,36 @@ TEST_P(BasicsTest, CyclesEnd) {
   EXPECT_EQ(sum.load(), std::uint64_t{kCount} * (kCount - 1) / 2);
   EXPECT_EQ(hops.load(), std::uint64_t{kCount} / 10 * 55);
   EXPECT_EQ(report.stages[1].items, kCount);
+}
+
+TEST_P(BasicsTest, ManyItemsGoEachItsOwnWay) {
+  constexpr std::uint32_t kCount = 50'000;
+  std::vector<std::atomic<int>> seen(kCount);
+  carpool::Graph graph;
+  const auto sort = graph.add_stage<std::uint32_t>({.name = "sort"});
+  const std::array sorted{graph.add_stage<std::uint32_t>({.name = "even", .bins = 5, .rank = 1}),
+                          graph.add_stage<std::uint32_t>({.name = "odd", .bins = 700, .rank = 2})};
+  const auto bins = std::array<std::uint32_t, 2>{5, 700};
+  graph.set_kernel(sort, [&](const Batch<std::uint32_t>& batch, Emitter& out) {
+    out.emit_each(batch.items, [&](std::uint32_t item) {
+      return std::pair(sorted[item % 2], item % bins[item % 2]);
+    });
+  });
+  for (const std::uint32_t odd : {0U, 1U}) {
+    graph.set_kernel(sorted[odd], [&, odd](const Batch<std::uint32_t>& batch, Emitter&) {
+      for (const std::uint32_t item : batch.items) {
+        EXPECT_EQ(item % 2, odd);
+        EXPECT_EQ(item % bins[odd], batch.bin);
+        seen[item].fetch_add(1);
+      }
+    });
+  }
+  graph.add_source({.name = "numbers"}, counting_source(sort, kCount, 1));
+  const carpool::RunReport report = carpool::run(graph, options());
+  for (const auto& count : seen) {
+    ASSERT_EQ(count.load(), 1);
+  }
+  EXPECT_LE(report.peak_bytes, report.worst_case_bytes);
 }
 
 INSTANTIATE_TEST_SUITE_P(

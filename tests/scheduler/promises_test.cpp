@@ -2,10 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <span>
 #include <sstream>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "allocations.h"
@@ -411,6 +414,27 @@ TEST(EmitterTest, RefusesBinsAndHandlesThatDoNotExist) {
     });
     EXPECT_THROW(carpool::run(graph), std::out_of_range);
   }
+}
+
+// A kernel may go on after a refusal: what went before it is on its way, and counted.
+TEST(EmitterTest, WhatWentBeforeABadBinHoldsItsCredits) {
+  carpool::Graph graph;
+  const auto stage = graph.add_stage<int>({.name = "s", .bins = 3});
+  int items = 0;
+  graph.set_kernel(stage, [&](const Batch<int>& batch, Emitter&) {
+    items += static_cast<int>(batch.items.size());
+  });
+  graph.add_source({.name = "s"}, [&](SourceContext&, Emitter& out) {
+    const std::vector numbers{0, 1, 2, 3, 1};
+    const auto to = [&](int number) {
+      return std::pair(stage, static_cast<std::uint32_t>(number));
+    };
+    EXPECT_THROW(out.emit_each(std::span(numbers), to), std::out_of_range);
+    return SourceStatus::exhausted;
+  });
+  const carpool::RunReport report = carpool::run(graph, serial());
+  EXPECT_EQ(items, 3);
+  EXPECT_EQ(report.sources[0].items, 3U);
 }
 
 #ifndef NDEBUG

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <utility>
 
 #include "carpool/handles.h"
 #include "carpool/item.h"
@@ -20,6 +21,14 @@ struct OpenSlot {
   std::byte* end = nullptr;    // where the slow path is due: full, or much fuller than before
   std::byte* begin = nullptr;  // the block
   std::uint32_t level = 0;     // how far it has come; see Layout
+};
+
+// A part of a sum that is not in memory yet, also when an exception comes.
+struct TallyPart {
+  std::uint64_t& total;
+  std::uint64_t sum = 0;
+  void add_up() { total += std::exchange(sum, 0); }
+  ~TallyPart() { add_up(); }
 };
 
 [[noreturn]] void throw_bad_bin(std::uint32_t stage, std::uint32_t bin, std::uint32_t bins);
@@ -74,6 +83,39 @@ class Emitter {
     emit(stage, bin, std::span<const T>(items));
   }
 
+  /// emit_each hands on many items, each to where `to(item)` says: a std::pair of a stage's handle
+  /// and a bin. Cheaper than one by one, the more so where a kernel first computes all of its
+  /// items in one loop and then hands them on: between items, a branch that depends on the outcome
+  /// of one keeps the processor from beginning with the next.
+  template <Item T, class To>
+  void emit_each(std::span<const T> items, const To& to) {
+    // Copies, because to the compiler every item that is written could change the members.
+    detail::OpenSlot* const slots = slots_;
+    const std::uint64_t* const tally_of = tally_of_;
+    detail::TallyPart part{tally_};
+    for (const T& item : items) {
+      const auto& [stage, bin] = to(item);
+      if (bin < stage.bins_ && may_emit_to(stage.index_)) [[likely]] {
+        detail::OpenSlot& slot = slots[stage.first_slot_ + bin];
+        std::byte* const write = slot.write;
+        if (write != slot.end) [[likely]] {
+          std::memcpy(write, &item, sizeof(T));
+          slot.write = write + sizeof(T);
+          part.sum += tally_of[stage.index_];
+          continue;
+        }
+      }
+      part.add_up();  // what becomes full is published with its credits
+      emit(stage, bin, item);
+    }
+  }
+
+  /// emit_each, for callers whose span is of non-const items.
+  template <Item T, class To>
+  void emit_each(std::span<T> items, const To& to) {
+    emit_each(std::span<const T>(items), to);
+  }
+
  protected:
   Emitter() = default;
   ~Emitter() = default;
@@ -93,12 +135,19 @@ class Emitter {
     if (bin >= stage.bins_) [[unlikely]] {
       detail::throw_bad_bin(stage.index_, bin, stage.bins_);
     }
-#ifndef NDEBUG
-    if (allowed_ != nullptr && allowed_[stage.index_] == 0) {
+    if (!may_emit_to(stage.index_)) {
       detail::throw_undeclared_edge(emitting_, stage.index_);
     }
-#endif
     return slots_[stage.first_slot_ + bin];
+  }
+
+  // Whether the edge is declared, if the node that emits has declared any. Debug builds check.
+  bool may_emit_to([[maybe_unused]] std::uint32_t stage) const {
+#ifndef NDEBUG
+    return allowed_ == nullptr || allowed_[stage] != 0;
+#else
+    return true;
+#endif
   }
 };
 

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <tbb/info.h>
