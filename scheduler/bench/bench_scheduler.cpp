@@ -293,8 +293,12 @@ double seconds_of(const std::function<void()>& work) {
 // The examples against what one would write with oneTBB alone.
 void twins(bool quick) {
   const auto ratio = [&](const std::function<void()>& plain, const std::function<void()>& ours) {
-    const double first = seconds_of(plain);  // once: these runs are long
-    return first / seconds_of(ours);
+    std::vector<double> ratios;
+    for (int round = 0; round < 3; ++round) {  // few: these runs are long
+      const double first = seconds_of(plain);
+      ratios.push_back(first / seconds_of(ours));
+    }
+    return median(ratios);
   };
   const std::uint32_t histories = quick ? 100'000 : 10'000'000;
   const transport::Slab slab(
