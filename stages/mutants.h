@@ -27,12 +27,13 @@ enum class Mutant {
   naive_ggx,       // D(h) from 1 - cos^2
   shifted_sky,     // the environment's texel centres at whole numbers, for looking up alone
   rejected_nan,    // samples that are not finite vanish without a word
+  blurred_lights,  // triangles are sampled from however near their planes
 };
 
 #ifdef CARPOOL_MUTANTS
 
 inline Mutant MutantFromEnvironment() {
-  constexpr std::array<std::pair<std::string_view, Mutant>, 11> kNames{
+  constexpr std::array<std::pair<std::string_view, Mutant>, 12> kNames{
       {{"none", Mutant::none},
        {"large_pdf", Mutant::large_pdf},
        {"missing_cosine", Mutant::missing_cosine},
@@ -43,7 +44,8 @@ inline Mutant MutantFromEnvironment() {
        {"naive_uniform", Mutant::naive_uniform},
        {"naive_ggx", Mutant::naive_ggx},
        {"shifted_sky", Mutant::shifted_sky},
-       {"rejected_nan", Mutant::rejected_nan}}};
+       {"rejected_nan", Mutant::rejected_nan},
+       {"blurred_lights", Mutant::blurred_lights}}};
   const char* const wanted = std::getenv("CARPOOL_MUTANT");
   if (wanted == nullptr) return Mutant::none;
   for (const auto& [name, mutant] : kNames) {

@@ -33,6 +33,7 @@ struct LightSample {
   Mask<D> delta;   // punctual: no other way of finding the light
   Int<D> light;    // kNone: the environment, or no sample
   Real<D> b1, b2;  // triangle: barycentrics of p1 and p2
+  Real<D> blur;    // triangle: relative error of the distance at which rays find it
 };
 
 /// The kind of light that each lane's number falls to, in the order tree, infinite, environment.
@@ -71,7 +72,8 @@ HWY_INLINE LightSample<D> Merge(D d, Mask<D> m, const LightSample<D>& a, const L
           hn::Or(hn::AndNot(m, a.delta), hn::And(m, b.delta)),
           hn::IfThenElse(ToIntMask(d, m), b.light, a.light),
           hn::IfThenElse(m, b.b1, a.b1),
-          hn::IfThenElse(m, b.b2, a.b2)};
+          hn::IfThenElse(m, b.b2, a.b2),
+          hn::IfThenElse(m, b.blur, a.blur)};
 }
 
 template <class D>
@@ -79,7 +81,7 @@ HWY_INLINE LightSample<D> NoLight(D d) {
   const Real<D> zero = hn::Zero(d);
   const Mask<D> never = hn::Lt(zero, zero);
   const Int<D> none = hn::Set(IntTag<D>(), kNone);
-  return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0), zero, never, none, zero, zero};
+  return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0), zero, never, none, zero, zero, zero};
 }
 
 /// `pdf` of the result has no selection in it. A light with one side gives nothing behind it.
@@ -107,6 +109,7 @@ HWY_INLINE LightSample<D> FromTriangle(D d, const LightView& view, Mask<D> activ
   sample.light = light;
   sample.b1 = s.b1;
   sample.b2 = s.b2;
+  sample.blur = s.blur;
   return sample;
 }
 

@@ -14,6 +14,8 @@
 // Triangles"), in the form of Peters 2021, "BRDF Importance Sampling for Polygonal Lights": half
 // angles and no angle sums, hence without the cancellation of alpha + beta + gamma - pi.
 //
+// None of them where the triangle is blurred (see kGreatestBlur): it is left to BSDF sampling.
+//
 // Per-target header: see stages/simd/lanes-inl.h.
 
 #if defined(CARPOOL_STAGES_KERNELS_LIGHT_TRIANGLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -24,6 +26,7 @@
 #endif
 
 #include "stages/kernels/light_math-inl.h"
+#include "stages/mutants.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
@@ -32,12 +35,23 @@ namespace lights {
 constexpr double kLeastSolidAngle = 3e-4;
 constexpr double kGreatestSolidAngle = 6.2;
 
+/// How far a ray's hit may be off the triangle's plane, relative to the distance of its farthest
+/// vertex: Embree subtracts the origin from the vertices, which rounds them, and takes products of
+/// the differences.
+constexpr double kPlaneError = 0x1p-20;
+/// Of a triangle so near to its own plane, relative to its size, that this share of the height over
+/// the plane is rounding, it depends on chance which of several triangles a ray meets first: shadow
+/// rays would be blocked, or pass, at random. Light sampling leaves it alone, and its density for
+/// what BSDF sampling finds of it is 0. Hence MIS counts everything that rays meet just once.
+constexpr double kGreatestBlur = 0x1p-6;
+
 template <class D>
 struct TriangleLightSample {
   Real<D> b1, b2;  // barycentrics of p1 and p2
   Vec3<D> wi;      // unit, from the receiver
   Real<D> distance;
-  Real<D> pdf;  // per solid angle; 0: no sample
+  Real<D> blur;  // relative error of the distance at which rays find the triangle
+  Real<D> pdf;   // per solid angle; 0: no sample
 };
 
 /// The triangle as the receiver sees it.
@@ -49,6 +63,7 @@ struct SphericalTriangle {
   Vec3<D> a, b, c;      // unit directions to the vertices; a to c is the longest arc
   Real<D> one_plus_ab, ac, bc;
   Real<D> volume;  // |a . (b x c)|
+  Real<D> blur;    // kPlaneError over the height, relative to the size
   Real<D> solid_angle;
   Mask<D> tiny, huge;  // which method samples it
 };
@@ -88,6 +103,8 @@ HWY_INLINE SphericalTriangle<D> SeenFrom(D d, const Vec3<D>& p0, const Vec3<D>& 
   const Vec3<D> nearest = Select<D>(hn::Lt(q2, hn::Min(q0, q1)), t.p2, nearer);
   t.triple = Dot(t.area_normal, nearest);
   t.volume = hn::Abs(t.triple * r0 * r1 * r2);
+  const Real<D> height = hn::Abs(t.triple) * hn::Min(r0, hn::Min(r1, r2));  // times twice the area
+  t.blur = SafeDiv(d, Splat(d, kPlaneError) * hn::Sqrt(Dot(t.area_normal, t.area_normal)), height);
 
   const Real<D> d01 = Dot(t.a, t.b), d12 = Dot(t.b, t.c), d20 = Dot(t.c, t.a);
   t.solid_angle = Splat(d, 2) * AngleOf(d, t.volume, one + d01 + d12 + d20);
@@ -99,7 +116,9 @@ HWY_INLINE SphericalTriangle<D> SeenFrom(D d, const Vec3<D>& p0, const Vec3<D>& 
   t.tiny = hn::Lt(t.solid_angle, Splat(d, kLeastSolidAngle));
   t.huge = hn::Gt(t.solid_angle, Splat(d, kGreatestSolidAngle));
   // A triangle seen edge on has no inside and no side.
-  t.solid_angle = hn::IfThenElseZero(hn::Gt(t.volume, zero), t.solid_angle);
+  const double most = IsMutant(Mutant::blurred_lights) ? 1e30 : kGreatestBlur;
+  const Mask<D> clear = hn::Le(t.blur, Splat(d, most));
+  t.solid_angle = hn::IfThenElseZero(hn::And(clear, hn::Gt(t.volume, zero)), t.solid_angle);
   return t;
 }
 
@@ -181,8 +200,8 @@ HWY_INLINE Real<D> PdfOf(D d, const SphericalTriangle<D>& t, const Vec3<D>& wi, 
                             hn::IfThenElse(t.tiny, by_area, even));
 }
 
-/// A point of the triangle as seen from `ref`. From within the triangle's plane there is none (pdf
-/// 0).
+/// A point of the triangle as seen from `ref`. From within the triangle's plane, or too near to it,
+/// there is none (pdf 0).
 template <class D>
 HWY_INLINE TriangleLightSample<D> SampleTriangleLight(D d, const Vec3<D>& p0, const Vec3<D>& p1,
                                                       const Vec3<D>& p2, const Vec3<D>& ref,
@@ -204,7 +223,7 @@ HWY_INLINE TriangleLightSample<D> SampleTriangleLight(D d, const Vec3<D>& p0, co
   const Vec3<D> wi = Scale(point, SafeDiv(d, Splat(d, 1), distance));
   const Mask<D> missed = hn::Or(hn::Lt(b0, zero), hn::Lt(hn::Min(b.b1, b.b2), zero));
   const Mask<D> ok = hn::AndNot(hn::And(t.huge, missed), hn::Gt(distance, zero));
-  return {b.b1, b.b2, wi, distance, hn::IfThenElseZero(ok, PdfOf(d, t, wi, distance))};
+  return {b.b1, b.b2, wi, distance, t.blur, hn::IfThenElseZero(ok, PdfOf(d, t, wi, distance))};
 }
 
 /// Density with which `SampleTriangleLight` returns the point at `distance` along the unit `wi`.

@@ -196,8 +196,10 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> a
         lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
                                        t.p1, t.p2, Neg<D>(v.toward), v.distance);
     if (c.probe != nullptr) c.probe->emission_light_pdf = static_cast<float>(hn::GetLane(pdf));
-    weight =
-        hn::IfThenElse(sampled, StrategyWeight(d, c, DirectSampling::bsdf, v.ray_pdf, pdf), weight);
+    // What light sampling never finds has no other strategy, whichever is asked for.
+    const Mask<D> findable = hn::And(sampled, hn::Gt(pdf, hn::Zero(d)));
+    weight = hn::IfThenElse(findable, StrategyWeight(d, c, DirectSampling::bsdf, v.ray_pdf, pdf),
+                            weight);
   }
   if (c.probe != nullptr) c.probe->emission_weight = static_cast<float>(hn::GetLane(weight));
   const Vec3<D> added = Scale(Mul<D>(v.throughput, emitted), weight);
@@ -295,13 +297,16 @@ HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& 
   const Vec3<D> incoming = SampledRadiance(d, c, light, wanted);
   shadow.radiance = Scale(Mul<D>(Mul<D>(v.throughput, f.f_cos), incoming), scale);
   shadow.wanted = hn::And(wanted, hn::Gt(MaxComponent(shadow.radiance), zero));
-  // Stops short of the light by what both ends may be off, so that the light never shadows itself:
-  // a wall as close to the light as 2^-19 (distance + largest coordinates of both ends) is missed.
+  // Stops short of the light by what both ends and the plane of a triangle may be off, so that the
+  // light never shadows itself: a wall as close to the light as 2^-19 (distance + largest
+  // coordinates of both ends), or to its plane as 2^-20 of the distance to its farthest corner, is
+  // missed.
   const Vec3<D> end = MulAdd(light.wi, light.distance, s.origin);
   const auto most = [](const Vec3<D>& a) HWY_ATTR {
     return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
   };
-  const Real<D> margin = (light.distance + most(s.origin) + most(end)) * Splat(d, 0x1p-19);
+  const Real<D> ends = (light.distance + most(s.origin) + most(end)) * Splat(d, 0x1p-19);
+  const Real<D> margin = hn::MulAdd(light.distance, light.blur, ends);
   const Mask<D> near_light = hn::Lt(light.distance, Splat(d, 1e29));
   shadow.distance = hn::IfThenElse(near_light, light.distance - margin, light.distance);
   shadow.wanted = hn::And(shadow.wanted, hn::Gt(shadow.distance, zero));

@@ -18,6 +18,36 @@ ClosedForm ClosedFurnace(int depth) {
   return {12, c, {.expected = emission * (1 - std::pow(rho, depth + 1)) / (1 - rho)}};
 }
 
+/// Row 29: a camera within rounding of the common corner of glowing triangles that are a million
+/// times larger than what it sees of them. Where their planes are, no ray can tell; what it meets
+/// must count once all the same.
+ClosedForm CornerOfLights() {
+  const double rho = 0.8, emission = 0.5;
+  constexpr int kDepth = 2, kSpikes = 40;
+  SceneCase c{.name = "row29_corner_of_lights"};
+  SceneBuilder& b = c.scene;
+  const int material = b.AddLambert({rho, rho, rho}, {emission, emission, emission});
+  b.json()["materials"][static_cast<size_t>(material)]["doubleSided"] = true;
+  b.PlaceMesh(b.AddBox(1, material, true));
+  const Point eye = {0.1, 0.2, 0.3};  // a corner is the nearest float to it
+  const auto spike = [&](int i) {
+    const double z = 1 - (2 * (i % kSpikes) + 1.0) / kSpikes, phi = 2.4 * i;
+    const double r = 0.5 * std::sqrt(1 - z * z);
+    return Point{eye[0] + r * std::cos(phi), eye[1] + r * std::sin(phi), eye[2] + 0.5 * z};
+  };
+  std::vector<Point> points = {eye};
+  std::vector<uint32_t> indices;
+  for (int i = 0; i < kSpikes; ++i) {
+    points.push_back(spike(i));
+    indices.insert(indices.end(), {0u, 1 + static_cast<uint32_t>(i),
+                                   1 + static_cast<uint32_t>((i + 5) % kSpikes)});
+  }
+  b.PlaceMesh(b.AddMesh(points, indices, material));
+  b.AddCamera(eye, 1.2);
+  c.settings = HardSettings(128, kDepth);
+  return {29, c, {.expected = emission * (1 - std::pow(rho, kDepth + 1)) / (1 - rho)}};
+}
+
 /// A surface that reflects all light vanishes before a white sky. The code declares how far each
 /// (mu, roughness) may be off: 0.002.
 ClosedForm WhiteSphere(double metallic, double roughness) {
@@ -61,6 +91,7 @@ std::vector<ClosedForm> FurnaceForms() {
     for (const double roughness : {0.0, 0.1, 0.3, 0.7, 1.0})
       forms.push_back(WhiteSphere(metallic, roughness));
   }
+  forms.push_back(CornerOfLights());
   for (const int roulette : {0, 3, 256}) forms.push_back(LongPaths(roulette));
   return forms;
 }
