@@ -69,12 +69,16 @@ struct SphericalTriangle {
 };
 
 /// Rotates the vertices so that the longest arc, whose ends have the least cosine, is opposite `b`.
+/// Of arcs that are as good as equal it is the first: in a triangle that is symmetric, as the
+/// receiver sees it, rounding must not decide which point belongs to which random numbers.
 template <class D>
-HWY_INLINE void PutLongestArcFirst(const Real<D>& d01, const Real<D>& d12, const Real<D>& d20,
+HWY_INLINE void PutLongestArcFirst(D d, const Real<D>& d01, const Real<D>& d12, const Real<D>& d20,
                                    Vec3<D>& a, Vec3<D>& b, Vec3<D>& c) {
   const Vec3<D> v0 = a, v1 = b, v2 = c;
-  const Mask<D> arc01 = hn::And(hn::Le(d01, d12), hn::Le(d01, d20));
-  const Mask<D> arc12 = hn::AndNot(arc01, hn::Le(d12, d20));
+  const Real<D> one = Splat(d, 1), equal = Splat(d, 1 + 0x1p-6);
+  const Real<D> s01 = (one - d01) * equal, s12 = one - d12, s20 = one - d20;
+  const Mask<D> arc01 = hn::And(hn::Ge(s01, s12), hn::Ge(s01, s20));
+  const Mask<D> arc12 = hn::AndNot(arc01, hn::Ge(s12 * equal, s20));
   a = Select<D>(arc01, v1, Select<D>(arc12, v2, v0));
   b = Select<D>(arc01, v2, Select<D>(arc12, v0, v1));
   c = Select<D>(arc01, v0, Select<D>(arc12, v1, v2));
@@ -108,7 +112,7 @@ HWY_INLINE SphericalTriangle<D> SeenFrom(D d, const Vec3<D>& p0, const Vec3<D>& 
 
   const Real<D> d01 = Dot(t.a, t.b), d12 = Dot(t.b, t.c), d20 = Dot(t.c, t.a);
   t.solid_angle = Splat(d, 2) * AngleOf(d, t.volume, one + d01 + d12 + d20);
-  PutLongestArcFirst<D>(d01, d12, d20, t.a, t.b, t.c);
+  PutLongestArcFirst(d, d01, d12, d20, t.a, t.b, t.c);
   const Vec3<D> sum = Add(t.a, t.b);
   t.one_plus_ab = Splat(d, 0.5) * Dot(sum, sum);
   t.ac = Dot(t.a, t.c);
