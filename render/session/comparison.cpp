@@ -41,11 +41,32 @@ std::string Causes(const PathComparison& c) {
   return text.empty() ? "none" : text;
 }
 
-uint32_t Column(const RenderSummary& s, const WorstPath& w) {
-  return w.pixel % static_cast<uint32_t>(s.width);
+uint32_t Column(const RenderSummary& s, uint32_t pixel) {
+  return pixel % static_cast<uint32_t>(s.width);
 }
-uint32_t Row(const RenderSummary& s, const WorstPath& w) {
-  return w.pixel / static_cast<uint32_t>(s.width);
+uint32_t Row(const RenderSummary& s, uint32_t pixel) {
+  return pixel / static_cast<uint32_t>(s.width);
+}
+
+std::string HitText(const stages::PartedPath::Hit& hit) {
+  if (hit.placement < 0) return "nothing";
+  return Format("triangle %u of mesh %d at %.9g", hit.primitive, hit.placement, hit.distance);
+}
+
+/// The first path that parted for each cause.
+std::string FirstParted(const RenderSummary& s) {
+  std::string text;
+  for (size_t i = 1; i < stages::kPartings; ++i) {
+    const stages::PartedPath& first = s.comparison.first[i];
+    if (s.comparison.parted[i] == 0 || first.pixel == ~0u) continue;
+    text += Format("    the first parted by %s: pixel %u,%u sample %u at vertex %u, which is ",
+                   std::string(Name(static_cast<Parting>(i))).c_str(), Column(s, first.pixel),
+                   Row(s, first.pixel), first.sample, first.vertex) +
+            HitText(first.single);
+    if (i == static_cast<size_t>(Parting::hit)) text += " instead of " + HitText(first.reference);
+    text += "\n";
+  }
+  return text;
 }
 
 }  // namespace
@@ -61,10 +82,10 @@ std::string ComparisonText(const RenderSummary& s) {
                          RootMeanSquare(c), MeanDifference(c));
   for (const WorstPath& w : c.worst) {
     text += Format("    pixel %u,%u sample %u: %.2g off at vertex %u, %s %.9g instead of %.9g\n",
-                   Column(s, w), Row(s, w), w.sample, w.deviation, w.vertex,
+                   Column(s, w.pixel), Row(s, w.pixel), w.sample, w.deviation, w.vertex,
                    w.gathered ? "radiance" : "throughput", w.single, w.reference);
   }
-  return text;
+  return text + FirstParted(s);
 }
 
 nlohmann::ordered_json ComparisonJson(const RenderSummary& s) {
@@ -76,7 +97,7 @@ nlohmann::ordered_json ComparisonJson(const RenderSummary& s) {
   json["mean"] = MeanDifference(c);
   json["worst"] = nlohmann::ordered_json::array();
   for (const WorstPath& w : c.worst) {
-    json["worst"].push_back({{"pixel", {Column(s, w), Row(s, w)}},
+    json["worst"].push_back({{"pixel", {Column(s, w.pixel), Row(s, w.pixel)}},
                              {"sample", w.sample},
                              {"deviation", w.deviation},
                              {"vertex", w.vertex},

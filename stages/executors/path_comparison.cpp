@@ -50,6 +50,19 @@ void Keep(std::vector<WorstPath>& worst, const WorstPath& path) {
   if (worst.size() > PathComparison::kWorst) worst.pop_back();
 }
 
+/// The number of the vertex that a moment is about; the camera's is 0.
+uint32_t VertexOf(const PathMoment& m) {
+  return (m.flags & kPathDepthMask) + (m.step == PathStep::traced ? 1 : 0);
+}
+
+PartedPath::Hit HitOf(const PathMoment& m) {
+  return {m.placement, m.primitive, m.distance};
+}
+
+void KeepFirst(PartedPath& first, const PartedPath& path) {
+  if (std::tie(path.sample, path.pixel) < std::tie(first.sample, first.pixel)) first = path;
+}
+
 }  // namespace
 
 std::string_view Name(Parting parting) {
@@ -75,7 +88,11 @@ void PathComparison::Add(uint32_t pixel, uint32_t sample, const std::vector<Path
   const size_t common = std::min(single.size(), reference.size());
   for (size_t i = 0; i < common && path.parting == Parting::none; ++i) {
     path.parting = PartingOf(single[i], reference[i]);
-    if (path.parting != Parting::none) break;
+    if (path.parting != Parting::none) {
+      KeepFirst(first[static_cast<size_t>(path.parting)],
+                {pixel, sample, VertexOf(reference[i]), HitOf(single[i]), HitOf(reference[i])});
+      break;
+    }
     Drift(single[i].radiance, reference[i].radiance, true, reference[i], path);
     Drift(single[i].throughput, reference[i].throughput, false, reference[i], path);
   }
@@ -93,7 +110,10 @@ void PathComparison::Add(uint32_t pixel, uint32_t sample, const std::vector<Path
 
 PathComparison& PathComparison::operator+=(const PathComparison& other) {
   paths += other.paths;
-  for (size_t i = 0; i < kPartings; ++i) parted[i] += other.parted[i];
+  for (size_t i = 0; i < kPartings; ++i) {
+    parted[i] += other.parted[i];
+    KeepFirst(first[i], other.first[i]);
+  }
   sum += other.sum;
   reference_sum += other.reference_sum;
   squares += other.squares;

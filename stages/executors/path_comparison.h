@@ -23,6 +23,7 @@ struct PathMoment {
   uint32_t primitive, flags;
   bool shadow;  // a shadow ray is wanted; once it was traced: some of it got through
   double radiance[3], throughput[3];
+  double distance;  // along the ray, to what it hit
 };
 
 /// The moments of one path, as FollowPath's observer.
@@ -37,6 +38,7 @@ class PathRecorder {
     m.placement = static_cast<int32_t>(path.placement);
     m.primitive = static_cast<uint32_t>(path.primitive);
     m.flags = static_cast<uint32_t>(path.flags);
+    m.distance = static_cast<double>(path.distance);
     m.lobe = probe_.lobe;
     m.light = probe_.light;
     for (int i = 0; i < 3; ++i) {
@@ -74,14 +76,28 @@ struct WorstPath {
   Parting parting;           // how the comparison ended
 };
 
+/// A path that parted from its self in double, and what each of the two had before it then.
+struct PartedPath {
+  struct Hit {
+    int32_t placement;
+    uint32_t primitive;
+    double distance;
+  };
+  uint32_t pixel = ~0u, sample = ~0u;
+  uint32_t vertex = 0;
+  Hit single = {}, reference = {};
+};
+
 /// All paths that were compared.
 struct PathComparison {
   static constexpr size_t kWorst = 10;
   uint64_t paths = 0;
   std::array<uint64_t, kPartings> parted = {};  // by Parting; `none`: together to their end
-  double sum = 0, reference_sum = 0;            // green of all samples, in float and in double
-  double squares = 0;            // of the deviations of radiance of paths that stayed together
-  std::vector<WorstPath> worst;  // at most kWorst, the worst first
+  /// For each Parting, the path with the least (sample, pixel), whatever the order they came in.
+  std::array<PartedPath, kPartings> first = {};
+  double sum = 0, reference_sum = 0;  // green of all samples, in float and in double
+  double squares = 0;                 // of the deviations of radiance of paths that stayed together
+  std::vector<WorstPath> worst;       // at most kWorst, the worst first
 
   void Add(uint32_t pixel, uint32_t sample, const std::vector<PathMoment>& single,
            const std::vector<PathMoment>& reference);
