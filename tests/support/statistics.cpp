@@ -94,6 +94,29 @@ double StudentQuantile(double p, double degrees) {
   return Bisect(0, 1e6, p, [&](double t) { return StudentTail(t, degrees); });
 }
 
+double DistanceFromUniform(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const auto n = static_cast<double>(values.size());
+  double distance = 0;
+  for (size_t i = 0; i < values.size(); ++i) {
+    const auto below = static_cast<double>(i);
+    distance = std::max({distance, values[i] - below / n, (below + 1) / n - values[i]});
+  }
+  return distance;
+}
+
+double KolmogorovTail(double distance, double count) {
+  const double root = std::sqrt(count), x = (root + 0.12 + 0.11 / root) * distance;
+  if (x < 0.2) return 1;  // the series below needs many terms, and 1 - its sum is under 1e-12
+  double sum = 0;
+  for (int k = 1; k <= 100; ++k) sum += (k % 2 == 1 ? 2 : -2) * std::exp(-2.0 * k * k * x * x);
+  return std::clamp(sum, 0.0, 1.0);
+}
+
+double KolmogorovDistance(double p, double count) {
+  return Bisect(0, 10, p, [&](double distance) { return KolmogorovTail(distance, count); });
+}
+
 double ChiSquaredTest(const std::vector<double>& counts, const std::vector<double>& expected) {
   double statistic = 0, pooled_count = 0, pooled_expected = 0;
   double cells = 0;

@@ -23,6 +23,14 @@ double ChiSquaredTail(double statistic, double degrees);
 /// The t that StudentTail takes to `p`, 0 < p < 1.
 double StudentQuantile(double p, double degrees);
 
+/// The largest difference between the shares of `values` below each x in [0, 1] and x itself.
+double DistanceFromUniform(std::vector<double> values);
+/// p-value of such a distance of `count` independent values that are uniform (Kolmogorov's limit
+/// with the correction of Stephens 1970, good to some percent from 8 values on).
+double KolmogorovTail(double distance, double count);
+/// The distance that KolmogorovTail takes to `p` < 0.1.
+double KolmogorovDistance(double p, double count);
+
 /// p-value of counts against expected counts with the same total; cells that expect fewer than 10
 /// are pooled. 0 where something was counted that is expected never.
 double ChiSquaredTest(const std::vector<double>& counts, const std::vector<double>& expected);

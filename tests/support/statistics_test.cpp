@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "tests/support/evidence.h"
+
 namespace carpool::test {
 namespace {
 
@@ -35,6 +37,34 @@ TEST(Statistics, ChiSquaredKnowsImpossibleCells) {
   EXPECT_EQ(ChiSquaredTest({100, 1}, {101, 0}), 0);
   EXPECT_EQ(ChiSquaredTest({100, 0}, {100, 0}), 1);
   EXPECT_NEAR(ChiSquaredTest({110, 90}, {100, 100}), NormalTail(std::sqrt(2.0)), 1e-9);
+}
+
+TEST(Statistics, KolmogorovsTailHasItsPublishedValues) {
+  EXPECT_NEAR(KolmogorovTail(1.3581 / 1e4, 1e8), 0.05, 1e-5);
+  EXPECT_NEAR(KolmogorovTail(1.6276 / 1e4, 1e8), 0.01, 1e-5);
+  EXPECT_NEAR(KolmogorovTail(0.29408, 20), 0.05, 2e-3);  // Massey 1951, n = 20
+  EXPECT_EQ(KolmogorovTail(0, 100), 1);
+  EXPECT_NEAR(KolmogorovTail(KolmogorovDistance(1e-6, 50), 50), 1e-6, 1e-9);
+  EXPECT_NEAR(DistanceFromUniform({0.9, 0.1, 0.2}), 2.0 / 3 - 0.2, 1e-12);
+}
+
+TEST(Evidence, FindsABiasOfAllRunsAndNoneWhereThereIsNone) {
+  std::mt19937 rng(2);
+  std::normal_distribution<double> noise;
+  for (const double bias : {0.0, 0.008}) {
+    Evidence evidence;
+    for (int run = 0; run < 400; ++run) {
+      Mean mean;
+      for (int k = 0; k < 16; ++k) mean.Add(5 * (1 + bias) * (1 + 0.02 * noise(rng)));
+      evidence.Add(mean, 5);
+    }
+    EXPECT_EQ(evidence.count(), 400u);
+    EXPECT_NEAR(evidence.CommonBias(), bias, 5 * evidence.CommonError());
+    EXPECT_EQ(evidence.IsUniform(), bias == 0);
+    EXPECT_EQ(evidence.IsUnbiased(2e-5), bias == 0);
+    EXPECT_LT(evidence.SmallestCommonBias(), 0.008);
+    EXPECT_GT(evidence.SmallestSingleBias(), 0.008);
+  }
 }
 
 /// Under the null hypothesis p-values are uniform: 2000 of them, and the share below 0.05 within
