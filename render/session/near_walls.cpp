@@ -119,8 +119,9 @@ void WarnOfWallsNearLights(const PreparedScene& scene, const stages::TraceView& 
   const std::vector<Light>& lights = scene.tables.lights.lights;
   if (!warn || lights.empty()) return;
   const stages::FlushDenormals denormals;
-  // The farthest receiver is twice the extent times sqrt(3) away, with coordinates of the extent.
-  const double reach = 0x1p-19 * (2 * std::sqrt(3.0) + 2) * Extent(trace);
+  // The farthest receiver is twice the extent times sqrt(3) away, with coordinates of the extent;
+  // half the distance again is for the plane of a triangle.
+  const double reach = 0x1p-19 * (3 * std::sqrt(3.0) + 2) * Extent(trace);
   const size_t step = (lights.size() + kLightsLookedAt - 1) / kLightsLookedAt;
   size_t looked_at = 0, hidden = 0;
   double nearest = std::numeric_limits<double>::infinity();
