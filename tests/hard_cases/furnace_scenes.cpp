@@ -48,6 +48,20 @@ ClosedForm CornerOfLights() {
   return {29, c, {.expected = emission * (1 - std::pow(rho, kDepth + 1)) / (1 - rho)}};
 }
 
+/// Row 29: a floor a thousandth of a millimetre under a glowing ceiling of 200 m: E = pi L.
+ClosedForm UnderCeiling() {
+  const double rho = 0.5, radiance = 2, height = 1e-6;
+  SceneCase c{.name = "row29_under_a_ceiling"};
+  SceneBuilder& b = c.scene;
+  b.PlaceMesh(
+      b.AddQuad({-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, {-1, 0, -1}, b.AddLambert({rho, rho, rho})));
+  b.PlaceMesh(b.AddQuad({-100, height, -100}, {100, height, -100}, {100, height, 100},
+                        {-100, height, 100}, b.AddLambert({0, 0, 0}, {1, 1, 1}, radiance)));
+  b.AddCameraAbove({0, height / 2, 0}, 0.5);
+  c.settings = HardSettings(128, 1);
+  return {29, c, {.expected = rho * radiance}};
+}
+
 /// A surface that reflects all light vanishes before a white sky. The code declares how far each
 /// (mu, roughness) may be off: 0.002.
 ClosedForm WhiteSphere(double metallic, double roughness) {
@@ -92,6 +106,7 @@ std::vector<ClosedForm> FurnaceForms() {
       forms.push_back(WhiteSphere(metallic, roughness));
   }
   forms.push_back(CornerOfLights());
+  forms.push_back(UnderCeiling());
   for (const int roulette : {0, 3, 256}) forms.push_back(LongPaths(roulette));
   return forms;
 }
