@@ -7,6 +7,7 @@
 #include "hwy/foreach_target.h"  // IWYU pragma: keep
 #include "hwy/highway.h"
 #include "stages/kernels/camera-inl.h"
+#include "stages/kernels/check_outputs.h"
 #include "stages/kernels/shade-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -16,17 +17,25 @@ namespace {
 using Wide = hn::ScalableTag<float>;
 using One = hn::CappedTag<float, 1>;
 
+void Check(const char* kernel, const PathState* paths, std::span<const uint32_t> slots) {
+  if constexpr (kCheckOutputs) {
+    for (const uint32_t slot : slots) CheckOutput(kernel, paths[slot]);
+  }
+}
+
 template <class D>
 void Camera(const KernelContext& c, PathState* paths, std::span<const uint32_t> slots) {
   const D d;
   for (size_t i = 0; i < slots.size(); i += hn::Lanes(d)) {
     CameraLanes(d, c, LoadSlots(d, paths, slots.data() + i, slots.size() - i));
   }
+  Check("camera", paths, slots);
 }
 
 template <class D>
 void Shade(const KernelContext& c, PathState* paths, std::span<const uint32_t> slots, Next* next) {
   ShadePaths(D(), c, paths, slots, next);
+  Check("shading", paths, slots);
 }
 
 template <class D>
@@ -35,6 +44,7 @@ void Miss(const KernelContext& c, PathState* paths, std::span<const uint32_t> sl
   for (size_t i = 0; i < slots.size(); i += hn::Lanes(d)) {
     MissLanes(d, c, LoadSlots(d, paths, slots.data() + i, slots.size() - i));
   }
+  Check("environment", paths, slots);
 }
 
 float OpacityAt(const void* context, int32_t placement, uint32_t primitive, float u, float v) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
+#include <limits>
 #include <map>
 #include <mutex>
 #include <set>
@@ -9,6 +10,7 @@
 #include "stages/executors/binning.h"
 #include "stages/executors/camera_work.h"
 #include "stages/executors/slot_pool.h"
+#include "stages/kernels/check_outputs.h"
 
 namespace carpool::stages {
 namespace {
@@ -92,6 +94,25 @@ TEST(ShadeBins, CoarsensAndSaysSo) {
   for (int32_t m = 0; m < 10000; ++m) EXPECT_LT(many.Of(m, 7), many.count());
   const ShadeBins tiny(3, 8, 100, 4096);
   EXPECT_EQ(tiny.count(), 1u);
+}
+
+TEST(CheckOutputs, NamesWhatIsWrong) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  PathState good = {};
+  good.direction[1] = -1;
+  good.throughput[0] = 1;
+  EXPECT_EQ(FaultOf(good), nullptr);
+  const auto fault = [&](auto change) {
+    PathState path = good;
+    change(path);
+    const char* const name = FaultOf(path);
+    return std::string(name != nullptr ? name : "nothing");
+  };
+  EXPECT_EQ(fault([](PathState& p) { p.origin[2] = kNan; }), "origin");
+  EXPECT_EQ(fault([](PathState& p) { p.direction[1] = -0.99f; }), "direction");
+  EXPECT_EQ(fault([](PathState& p) { p.pdf = kNan; }), "pdf");
+  EXPECT_EQ(fault([](PathState& p) { p.throughput[1] = -1e-9f; }), "throughput");
+  EXPECT_EQ(fault([](PathState& p) { p.radiance[0] = kNan; }), "radiance");
 }
 
 }  // namespace
