@@ -7,6 +7,7 @@
 #include <span>
 
 #include "stages/tracing/layers.h"
+#include "stages/tracing/packet_size.h"
 
 namespace carpool::stages {
 namespace {
@@ -214,14 +215,7 @@ void IntersectPath(const TraceView& view, PathState& path) {
 }
 
 void IntersectPaths(const TraceView& view, PathState* paths, std::span<const uint32_t> slots) {
-  switch (view.packet_size) {
-    case 16:
-      return IntersectSlots<16>(view, paths, slots);
-    case 8:
-      return IntersectSlots<8>(view, paths, slots);
-    default:
-      return IntersectSlots<4>(view, paths, slots);
-  }
+  WithPacketSize(view.packet_size, [&](auto size) { IntersectSlots<size()>(view, paths, slots); });
 }
 
 void IntersectPacket(const TraceView& view, PathState* const paths[8]) {
@@ -248,14 +242,8 @@ void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& 
 
 void TraceShadows(const TraceView& view, const OpacityQuery& opacity, PathState* paths,
                   std::span<const uint32_t> slots) {
-  switch (view.packet_size) {
-    case 16:
-      return TraceSlotShadows<16>(view, opacity, paths, slots);
-    case 8:
-      return TraceSlotShadows<8>(view, opacity, paths, slots);
-    default:
-      return TraceSlotShadows<4>(view, opacity, paths, slots);
-  }
+  WithPacketSize(view.packet_size,
+                 [&](auto size) { TraceSlotShadows<size()>(view, opacity, paths, slots); });
 }
 
 }  // namespace carpool::stages

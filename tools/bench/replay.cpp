@@ -7,9 +7,9 @@
 #include <array>
 #include <chrono>
 #include <limits>
-#include <type_traits>
 
 #include "stages/simd/denormals.h"
+#include "stages/tracing/packet_size.h"
 
 namespace carpool::tools {
 namespace {
@@ -218,14 +218,6 @@ void ReplayShadowPackets(const stages::TraceView& view, const RecordedRay* rays,
   });
 }
 
-/// `by_size(std::integral_constant<int, N>)` with the packets that the machine has.
-template <class BySize>
-void WithPacketSize(int size, const BySize& by_size) {
-  if (size == 16) return by_size(std::integral_constant<int, 16>());
-  if (size == 8) return by_size(std::integral_constant<int, 8>());
-  by_size(std::integral_constant<int, 4>());
-}
-
 }  // namespace
 
 RayLog RecordRays(const KernelContext& context, const stages::Kernels& kernels, uint32_t samples) {
@@ -267,7 +259,7 @@ double Replay(const stages::TraceView& view, const RayLog& log, const ReplayWay&
         });
     }
     if (way.packets) {
-      WithPacketSize(view.packet_size, [&](auto size) {
+      stages::WithPacketSize(view.packet_size, [&](auto size) {
         in_chunks(bounce.size(), 512, [&](size_t first, size_t last) {
           ReplayBouncePackets<size()>(view, &bounce[first], last - first);
         });
