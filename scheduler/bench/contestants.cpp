@@ -33,6 +33,19 @@ tbb::task_arena& arena_of(const Setup& setup) {
   return arenas.try_emplace(setup.threads, setup.threads).first->second;
 }
 
+carpool::RunOptions options_of(const Setup& setup) {
+  carpool::RunOptions options{.in_flight = setup.in_flight};
+  options.flush.count = setup.flush_count;
+  if (setup.simulation != nullptr) {
+    options.threads = static_cast<std::uint32_t>(setup.threads);
+    options.mode = carpool::RunMode::simulated;
+    options.simulation = *setup.simulation;
+  } else {
+    options.arena = &arena_of(setup);
+  }
+  return options;
+}
+
 }  // namespace
 
 Result inlined_loop(const Work& work, const Setup& setup) {
@@ -104,18 +117,38 @@ Result carpool_run(const Work& work, const Setup& setup, carpool::RunReport& rep
         }
         return last < work.items ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
       });
-  carpool::RunOptions options{.in_flight = setup.in_flight};
-  if (setup.simulation != nullptr) {
-    options.threads = static_cast<std::uint32_t>(setup.threads);
-    options.mode = carpool::RunMode::simulated;
-    options.simulation = *setup.simulation;
-  } else {
-    options.arena = &arena_of(setup);
-  }
-  report = carpool::run(graph, options);
+  report = carpool::run(graph, options_of(setup));
   Result sum;
   for (const Result& part : parts) {
     sum += part;
+  }
+  return sum;
+}
+
+std::uint64_t carpool_read(const BigTable& table, std::uint64_t items, const Setup& setup,
+                           carpool::RunReport& report) {
+  std::vector<Result> parts(static_cast<std::size_t>(setup.threads));
+  carpool::Graph graph;
+  const auto stage = graph.add_stage<std::uint64_t>({.name = "read", .block_items = 64});
+  graph.set_kernel(stage, [&](const carpool::Batch<std::uint64_t>& batch, carpool::Emitter&) {
+    for (const std::uint64_t item : batch.items) {
+      parts[batch.worker].sum += table.sum_of(item);
+    }
+  });
+  std::atomic<std::uint64_t> next{0};
+  graph.add_source(
+      {.name = "items", .concurrency = 0}, [&](carpool::SourceContext& ctx, carpool::Emitter& out) {
+        const std::uint64_t first = next.fetch_add(ctx.budget);
+        const std::uint64_t last = std::min(items, first + ctx.budget);
+        for (std::uint64_t id = first; id < last; ++id) {
+          out.emit(stage, 0, make_item({}, id).hash >> 32);
+        }
+        return last < items ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
+      });
+  report = carpool::run(graph, options_of(setup));
+  std::uint64_t sum = 0;
+  for (const Result& part : parts) {
+    sum += part.sum;
   }
   return sum;
 }

@@ -17,6 +17,10 @@ SimulatedRun::SimulatedRun(const Graph& graph, const RunOptions& options, std::u
       core_(graph, options, workers, this),
       threads_(workers),
       random_state_(options.simulation.seed) {
+  if (!(settings_.memory_bytes_per_second > 0)) {
+    throw std::invalid_argument(
+        "carpool: Simulation::memory_bytes_per_second must be greater than 0");
+  }
   for (std::uint32_t i = 0; i < core_.layout.blocking_threads; ++i) {
     threads_.emplace_back().blocking = &core_.blocking_worker(i);
   }
@@ -48,8 +52,7 @@ void SimulatedRun::step(std::uint32_t thread) {
       case Next::find:
         return find(thread);
       case Next::perform:
-        core_.worker(threads_[thread].seat).perform(threads_[thread].work);
-        return schedule(thread, Next::find, settings_.choose_seconds);
+        return perform(thread);
       case Next::look:
         return look(thread);
       case Next::fetch:
@@ -92,8 +95,7 @@ void SimulatedRun::find(std::uint32_t thread) {
   Thread& self = threads_[thread];
   Worker& worker = core_.worker(self.seat);
   if (worker.find(self.work)) {
-    const double seconds = jittered(cost(self.work));
-    self.work.virtual_ticks = static_cast<std::uint64_t>(seconds * 1e9);
+    self.work.virtual_ticks = span_of(self.work);
     const double extra = self.work.stolen ? settings_.steal_seconds : 0.0;
     self.next = Next::perform;
     events_.push({now_ + self.work.virtual_ticks + static_cast<std::uint64_t>(extra * 1e9),
@@ -105,6 +107,13 @@ void SimulatedRun::find(std::uint32_t thread) {
   } else {
     look(thread);
   }
+}
+
+void SimulatedRun::perform(std::uint32_t thread) {
+  Worker& worker = core_.worker(threads_[thread].seat);
+  worker.perform(threads_[thread].work);
+  const double publishing = settings_.publish_seconds * worker.take_published();
+  schedule(thread, Next::find, settings_.choose_seconds + publishing);
 }
 
 void SimulatedRun::look(std::uint32_t thread) {
@@ -133,9 +142,7 @@ void SimulatedRun::fetch(std::uint32_t thread) {
   Thread& self = threads_[thread];
   self.away = !self.blocking->take();
   if (!self.away) {
-    const double seconds =
-        jittered(batch_cost(self.blocking->stage(), self.blocking->items_taken()));
-    self.work.virtual_ticks = static_cast<std::uint64_t>(seconds * 1e9);
+    self.work.virtual_ticks = span_of_batch(self.blocking->stage(), self.blocking->items_taken());
     self.next = Next::block;
     events_.push({now_ + self.work.virtual_ticks, random(), thread});
   }
@@ -147,11 +154,23 @@ void SimulatedRun::schedule(std::uint32_t thread, Next next, double seconds) {
   events_.push({now_ + std::max<std::uint64_t>(1, ticks), random(), thread});
 }
 
-double SimulatedRun::cost(const Worker::Work& work) const {
+std::uint64_t SimulatedRun::span_of(const Worker::Work& work) {
   if (work.is_source) {
-    return settings_.source_item_seconds * work.budget;
+    return static_cast<std::uint64_t>(jittered(settings_.source_item_seconds * work.budget) * 1e9);
   }
-  return batch_cost(work.block.stage, work.block.items);
+  return span_of_batch(work.block.stage, work.block.items);
+}
+
+// Memory serves all workers in the order in which they begin: a batch ends when its kernel has
+// computed and its bytes, after those of others, have come.
+std::uint64_t SimulatedRun::span_of_batch(std::uint32_t stage, std::uint32_t items) {
+  const auto computed = static_cast<std::uint64_t>(jittered(batch_cost(stage, items)) * 1e9);
+  if (!settings_.batch_bytes) {
+    return computed;
+  }
+  const double seconds = settings_.batch_bytes(stage, items) / settings_.memory_bytes_per_second;
+  memory_free_ = std::max(memory_free_, static_cast<double>(now_)) + seconds * 1e9;
+  return std::max(computed, static_cast<std::uint64_t>(memory_free_) - now_);
 }
 
 double SimulatedRun::batch_cost(std::uint32_t stage, std::uint32_t items) const {

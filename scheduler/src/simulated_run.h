@@ -47,13 +47,15 @@ class SimulatedRun final : private Summoner {
   void arrive(std::uint32_t thread);
   void sit_down(std::uint32_t thread, bool searching);
   void find(std::uint32_t thread);
+  void perform(std::uint32_t thread);
   void look(std::uint32_t thread);
   void leave(std::uint32_t thread);
 
   void fetch(std::uint32_t thread);
 
   void schedule(std::uint32_t thread, Next next, double seconds);
-  double cost(const Worker::Work& work) const;
+  std::uint64_t span_of(const Worker::Work& work);
+  std::uint64_t span_of_batch(std::uint32_t stage, std::uint32_t items);
   double batch_cost(std::uint32_t stage, std::uint32_t items) const;
   std::uint64_t random();
   double jittered(double seconds);
@@ -67,6 +69,7 @@ class SimulatedRun final : private Summoner {
   std::vector<Thread> threads_;  // the caller first, those of blocking stages last
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   std::uint64_t now_ = 0;
+  double memory_free_ = 0;  // when it will have delivered all that was asked for so far
   std::uint64_t random_state_;
 };
 

@@ -439,6 +439,7 @@ void Worker::publish(const Block& block, FlushCause cause) {
 }
 
 void Worker::push_ready(const Block& block, FlushCause cause) {
+  ++published_;
   auto* ready = ::new (runner_.cache().allocate(layout_.node_class)) ReadyBlock;
   ready->block = block;
   ready->cause = cause;

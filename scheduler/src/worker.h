@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "batch_runner.h"
 #include "exchange.h"
@@ -44,6 +45,7 @@ class Worker final : private BlockSink {
   void begin_shift(bool searching);
   bool find(Work& work);
   void perform(const Work& work);
+  std::uint32_t take_published() { return std::exchange(published_, 0); }  // blocks since last time
   bool begin_search();
   bool search_goes_on() const;
   bool sees_work() const;
@@ -99,6 +101,7 @@ class Worker final : private BlockSink {
   bool searching_ = false;
   std::uint32_t next_victim_ = 0;
   std::uint32_t next_source_ = 0;
+  std::uint32_t published_ = 0;    // see take_published
   std::uint64_t share_after_ = 0;  // do not share before
   std::uint64_t share_pause_ = 0;  // ticks; doubles when sharing was in vain
   std::uint32_t shared_ = 0;       // blocks offered when it last shared

@@ -102,6 +102,60 @@ TEST(SimulationTest, MoreWorkersAreFaster) {
   EXPECT_LT(seconds(64), seconds(8));
 }
 
+// A source, and a stage whose every item, a block of its own, becomes one of the next stage.
+carpool::RunReport run_chain(std::uint32_t workers, const carpool::Simulation& simulation) {
+  carpool::Graph graph;
+  const auto last = graph.add_stage<int>({.name = "last", .block_items = 1});
+  const auto first = graph.add_stage<int>({.name = "first", .block_items = 1});
+  graph.set_kernel(last, [](const carpool::Batch<int>&, carpool::Emitter&) {});
+  graph.set_kernel(first, [&](const carpool::Batch<int>& batch, carpool::Emitter& out) {
+    out.emit(last, 0, batch.items);
+  });
+  int next = 0;
+  graph.add_source({.name = "s"}, [&](carpool::SourceContext&, carpool::Emitter& out) {
+    out.emit(first, 0, next);
+    return ++next < 1000 ? carpool::SourceStatus::more : carpool::SourceStatus::exhausted;
+  });
+  auto options = simulated(workers, 1);
+  options.simulation = simulation;
+  return carpool::run(graph, options);
+}
+
+// One worker, 2,000 blocks of one item: what is published, and not run at once, takes a second.
+TEST(SimulationTest, PublishingTakesItsTime) {
+  carpool::Simulation costs{.batch_seconds = [](std::uint32_t, std::uint32_t) { return 0.0; },
+                            .source_item_seconds = 0,
+                            .choose_seconds = 0,
+                            .publish_seconds = 0,
+                            .jitter = 0};
+  EXPECT_LT(run_chain(1, costs).seconds, 1);
+  costs.publish_seconds = 1;
+  const carpool::RunReport report = run_chain(1, costs);
+  double published = 0;
+  for (const carpool::StageReport& stage : report.stages) {
+    published += static_cast<double>(
+        stage.flushes_by_cause[static_cast<std::size_t>(carpool::FlushCause::full)]);
+  }
+  EXPECT_GT(published, 1990);
+  EXPECT_NEAR(report.seconds, published, 1);
+}
+
+// 1,000 batches of either stage want 3 bytes and a second each: 8 workers could do them in 250
+// seconds, but memory gives no more than 6 bytes a second.
+TEST(SimulationTest, WorkersShareMemory) {
+  carpool::Simulation costs{.batch_seconds = [](std::uint32_t, std::uint32_t) { return 1.0; },
+                            .batch_bytes = [](std::uint32_t, std::uint32_t) { return 3.0; },
+                            .memory_bytes_per_second = 6,
+                            .jitter = 0};
+  EXPECT_NEAR(run_chain(1, costs).seconds, 2000, 1);
+  EXPECT_NEAR(run_chain(2, costs).seconds, 1000, 20);
+  EXPECT_NEAR(run_chain(8, costs).seconds, 1000, 20);
+  costs.memory_bytes_per_second = 1e9;
+  EXPECT_NEAR(run_chain(8, costs).seconds, 250, 20);
+  costs.memory_bytes_per_second = 0;
+  EXPECT_THROW(run_chain(8, costs), std::invalid_argument);
+}
+
 // A deadline in virtual time: an endless graph ends after a simulated hour.
 TEST(SimulationTest, DeadlinesAreVirtual) {
   carpool::Graph graph;

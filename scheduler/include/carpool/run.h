@@ -40,9 +40,14 @@ struct Simulation {
   /// How long a batch of so many items of a stage takes. Empty: 100 ns and 20 ns per item.
   std::function<double(std::uint32_t stage, std::uint32_t items)> batch_seconds = {};
 
+  /// How many bytes a batch moves to and from the memory that all workers share. Empty: none.
+  std::function<double(std::uint32_t stage, std::uint32_t items)> batch_bytes = {};
+  double memory_bytes_per_second = 20e9;  ///< Of all together; what is asked for beyond that waits.
+
   double source_item_seconds = 10e-9;  ///< A source, per item.
   double choose_seconds = 50e-9;       ///< Finding the next batch among one's own.
-  double steal_seconds = 500e-9;       ///< Finding it with another worker.
+  double publish_seconds = 50e-9;      ///< Handing on a block that is full, or was asked for.
+  double steal_seconds = 500e-9;       ///< Finding the next batch with another worker.
   double wake_seconds = 20e-6;         ///< From an invitation to the helper's arrival.
 
   /// Every duration is multiplied by a random factor between 1 - jitter and 1 + jitter, which makes
