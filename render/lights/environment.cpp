@@ -112,11 +112,13 @@ EnvironmentReport BuildEnvironment(stages::Environment& environment, int width, 
   built.width = width;
   built.height = height;
   built.texels.resize(4 * w * h);
-  built.row_cdf.resize(h);
-  built.column_cdf.resize(w * h);
-
-  built.row_guide.resize(stages::GuideSize(height));
-  built.column_guide.resize(h * stages::GuideSize(width));
+  const auto make = [](std::vector<int32_t>& table, size_t entries) {
+    table.resize(entries + stages::kTablePadding);
+  };
+  make(built.row_cdf, h);
+  make(built.column_cdf, w * h);
+  make(built.row_guide, stages::GuideSize(height));
+  make(built.column_guide, h * stages::GuideSize(width));
 
   std::vector<double> rows(h);
   const auto weigh = [&](size_t y, std::span<double> columns) {
@@ -124,7 +126,7 @@ EnvironmentReport BuildEnvironment(stages::Environment& environment, int width, 
   };
   EachRow(h, w, [&](size_t y, std::span<double> columns) { rows[y] = weigh(y, columns); });
   Apportion(rows, built.row_cdf.data());
-  MakeGuide(built.row_cdf, built.row_guide.data());
+  MakeGuide(std::span(built.row_cdf).first(h), built.row_guide.data());
   EachRow(h, w, [&](size_t y, std::span<double> columns) {
     weigh(y, columns);
     const std::span<int32_t> cdf(&built.column_cdf[w * y], w);

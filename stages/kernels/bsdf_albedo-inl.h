@@ -60,14 +60,13 @@ HWY_INLINE AlbedoRow<D> FindAlbedoRow(D d, const BsdfTablesView& tables, Real<D>
   const Index<D> knot = hn::Min(ToIndex(d, average_position), hn::Set(di, kAverageRoughnesses - 2));
   const Real<D> t = average_position - FromIndex(d, knot);
   const Index<D> at = knot * hn::Set(di, kAverageColumns);
-  const float* low_knot = tables.average;
-  const float* high_knot = tables.average + kAverageColumns;
+  const Quad<D> a = LookUpQuad(d, tables.average, at);
+  const Quad<D> b = LookUpQuad(d, tables.average + kAverageColumns, at);
   return {r * r,
           position - FromIndex(d, row),
           row * hn::Set(di, kAlbedoCosines),
-          {LerpReal<D>(t, LookUpFloat(d, low_knot, at), LookUpFloat(d, high_knot, at)),
-           LerpReal<D>(t, LookUpFloat(d, low_knot + 1, at), LookUpFloat(d, high_knot + 1, at))},
-          LerpReal<D>(t, LookUpFloat(d, low_knot + 2, at), LookUpFloat(d, high_knot + 2, at))};
+          {LerpReal<D>(t, a.x, b.x), LerpReal<D>(t, a.y, b.y)},
+          LerpReal<D>(t, a.z, b.z)};
 }
 
 /// Bilinear look-up at cosine mu >= 0.
@@ -85,14 +84,12 @@ HWY_INLINE AlbedoAt<D> LookUpAlbedo(D d, const BsdfTablesView& tables, const Alb
   const Real<D> t = position - FromIndex(d, column);
   const Index<D> at = row.base + column;
 
-  const Index<D> w00 = LookUpWord(d, tables.albedo, at);
-  const Index<D> w01 = LookUpWord(d, tables.albedo + 1, at);
-  const Index<D> w10 = LookUpWord(d, tables.albedo + kAlbedoCosines, at);
-  const Index<D> w11 = LookUpWord(d, tables.albedo + kAlbedoCosines + 1, at);
-  const Real<D> m0 = LerpReal<D>(t, UpperHalf16(d, w00), UpperHalf16(d, w01));
-  const Real<D> m1 = LerpReal<D>(t, UpperHalf16(d, w10), UpperHalf16(d, w11));
-  const Real<D> c0 = LerpReal<D>(t, LowerHalf16(d, w00), LowerHalf16(d, w01));
-  const Real<D> c1 = LerpReal<D>(t, LowerHalf16(d, w10), LowerHalf16(d, w11));
+  const WordPair<D> row0 = LookUpWordPair(d, tables.albedo, at);
+  const WordPair<D> row1 = LookUpWordPair(d, tables.albedo + kAlbedoCosines, at);
+  const Real<D> m0 = LerpReal<D>(t, UpperHalf16(d, row0.first), UpperHalf16(d, row0.second));
+  const Real<D> m1 = LerpReal<D>(t, UpperHalf16(d, row1.first), UpperHalf16(d, row1.second));
+  const Real<D> c0 = LerpReal<D>(t, LowerHalf16(d, row0.first), LowerHalf16(d, row0.second));
+  const Real<D> c1 = LerpReal<D>(t, LowerHalf16(d, row1.first), LowerHalf16(d, row1.second));
   const Real<D> m = LerpReal<D>(row.fraction, m0, m1) * Splat(d, kAlbedoUnitM);
   const Real<D> c = hn::MulSub(LerpReal<D>(row.fraction, c0, c1), Splat(d, kAlbedoUnitC), one);
   return {m, hn::Max(hn::MulAdd(one - m, SchlickWeight(d, mu), c), hn::Zero(d))};

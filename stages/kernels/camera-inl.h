@@ -43,8 +43,8 @@ HWY_INLINE Vec2<D> ImagePlanePoint(D d, const KernelContext& c, Uint<D> pixel,
 template <class D>
 HWY_INLINE void CameraLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
   const UintTag<D> du;
-  const Uint<D> pixel = hn::BitCast(du, PathInt(d, p, offsetof(PathState, pixel)));
-  const Uint<D> sample = hn::BitCast(du, PathInt(d, p, offsetof(PathState, sample)));
+  const Quad<D> names = PathQuad(d, p, offsetof(PathState, pixel));  // pixel, sample, ...
+  const Uint<D> pixel = hn::BitCast(du, names.x), sample = hn::BitCast(du, names.y);
   const SampleKey<D> key = MakeSampleKey(d, pixel, sample, c.seed);
   const Vec2<D> u = Sample2D(d, key, hn::Zero(du), Purpose::camera_filter);
   const Vec2<D> plane = ImagePlanePoint(d, c, pixel, SamplePixelFilter(d, u));

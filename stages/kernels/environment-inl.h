@@ -180,17 +180,17 @@ HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> 
   const Int<D> guide = which * hn::Set(di, GuideSize(tables.count)) +
                        hn::ShiftRightSame(cell, 24 - GuideBits(tables.count));
 
-  Int<D> low = GatherInt(d, tables.guide, guide);
-  Int<D> high = GatherInt(d, tables.guide, guide + one);
+  const IntPair<D> bounds = GatherIntPair(d, tables.guide, guide);
+  Int<D> low = bounds.x, high = bounds.y;
   for (auto open = hn::Lt(low, high); !hn::AllFalse(di, open); open = hn::Lt(low, high)) {
     const Int<D> middle = hn::ShiftRight<1>(low + high + one);
     const auto above = hn::Gt(GatherInt(d, tables.cdf, cdf + middle), cell);
     low = hn::IfThenElse(hn::AndNot(above, open), middle, low);
     high = hn::IfThenElse(hn::And(above, open), middle - one, high);
   }
-  const Int<D> begin = GatherInt(d, tables.cdf, cdf + low);
-  const Int<D> next = GatherInt(d, tables.cdf, cdf + hn::Min(low + one, last));
-  const Int<D> end = hn::IfThenElse(hn::Lt(low, last), next, hn::Set(di, kEnvironmentMass));
+  const IntPair<D> mass = GatherIntPair(d, tables.cdf, cdf + low);
+  const Int<D> begin = mass.x;
+  const Int<D> end = hn::IfThenElse(hn::Lt(low, last), mass.y, hn::Set(di, kEnvironmentMass));
   // The middle of u's cell, so that an entry of a single cell is met at its centre.
   const Real<D> offset = hn::ConvertTo(d, cell - begin) + Splat(d, 0.5);
   const Real<D> within = SafeDiv(d, offset, hn::ConvertTo(d, end - begin));

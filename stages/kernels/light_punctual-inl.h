@@ -12,6 +12,7 @@
 #include <cstddef>
 
 #include "stages/kernels/light_math-inl.h"
+#include "stages/simd/quads-inl.h"
 #include "stages/tables/light_view.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -53,26 +54,27 @@ HWY_INLINE PunctualSample<D> SamplePunctual(D d, const Light* lights, Int<D> lig
                                             const Vec3<D>& ref) {
   const IntTag<D> di;
   const Int<D> type = FieldInt(d, lights, light, offsetof(Light, type));
+  const Quad<D> place = FieldQuad(d, lights, light, offsetof(Light, position));   // and range
+  const Quad<D> aim = FieldQuad(d, lights, light, offsetof(Light, direction));    // and cos_inner
+  const Quad<D> power = FieldQuad(d, lights, light, offsetof(Light, intensity));  // and cos_outer
   const auto is = [&](LightType wanted) HWY_ATTR {
     return ToMask(d, hn::Eq(type, hn::Set(di, static_cast<int32_t>(wanted))));
   };
   const Mask<D> directional = is(LightType::directional), spot = is(LightType::spot);
-  const Vec3<D> axis = FieldVec3(d, lights, light, offsetof(Light, direction));
-  const Vec3<D> to_light = Sub<D>(FieldVec3(d, lights, light, offsetof(Light, position)), ref);
+  const Vec3<D> axis = {aim.x, aim.y, aim.z};
+  const Vec3<D> to_light = Sub<D>({place.x, place.y, place.z}, ref);
   const Real<D> distance = SafeSqrt(d, Dot(to_light, to_light));
   const Vec3<D> wi =
       Select<D>(directional, Neg<D>(axis), Scale(to_light, SafeDiv(d, Splat(d, 1), distance)));
 
-  Real<D> factor = DistanceFactor(d, distance, FieldReal(d, lights, light, offsetof(Light, range)));
+  Real<D> factor = DistanceFactor(d, distance, place.w);
   if (!hn::AllFalse(d, spot)) {
-    const Real<D> cone = ConeFactor(d, hn::Neg(Dot(axis, wi)),
-                                    FieldReal(d, lights, light, offsetof(Light, cos_inner)),
-                                    FieldReal(d, lights, light, offsetof(Light, cos_outer)));
+    const Real<D> cone = ConeFactor(d, hn::Neg(Dot(axis, wi)), aim.w, power.w);
     factor = hn::IfThenElse(spot, factor * cone, factor);
   }
   factor = hn::IfThenElse(directional, Splat(d, 1), factor);
   return {wi, hn::IfThenElse(directional, Splat(d, kFarAway), distance),
-          Scale(FieldVec3(d, lights, light, offsetof(Light, intensity)), factor)};
+          Scale(Vec3<D>{power.x, power.y, power.z}, factor)};
 }
 
 }  // namespace lights

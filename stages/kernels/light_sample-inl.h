@@ -84,28 +84,43 @@ HWY_INLINE LightSample<D> NoLight(D d) {
   return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0), zero, never, none, zero, zero, zero};
 }
 
+/// What kind of light it is, and which triangle.
+template <class D>
+struct LightName {
+  Mask<D> triangle, one_sided;
+  Int<D> placement, primitive;  // meaningless unless it is a triangle
+};
+template <class D>
+HWY_INLINE LightName<D> LoadLightName(D d, const LightView& view, Int<D> light) {
+  const IntTag<D> di;
+  const IntQuad<D> q = FieldIntQuad(d, view.lights, light, offsetof(Light, type));
+  return {ToMask(d, hn::Lt(q.x, hn::Set(di, kLastTriangleType + 1))),
+          ToMask(d, hn::Eq(q.x, hn::Set(di, static_cast<int32_t>(LightType::triangle)))), q.y, q.z};
+}
+static_assert(offsetof(Light, placement) == offsetof(Light, type) + 4 &&
+              offsetof(Light, primitive) == offsetof(Light, type) + 8);
+
 /// `pdf` of the result has no selection in it. A light with one side gives nothing behind it.
 template <class D>
 HWY_INLINE LightSample<D> FromTriangle(D d, const LightView& view, Mask<D> active, Int<D> light,
-                                       const Vec3<D>& ref, const Vec2<D>& u) {
+                                       const LightName<D>& name, const Vec3<D>& ref,
+                                       const Vec2<D>& u) {
   // Idle lanes take the first light: where there are triangle lights, it is one.
-  const Int<D> valid = hn::IfThenElseZero(ToIntMask(d, active), light);
-  const auto field = [&](size_t offset)
-                         HWY_ATTR { return FieldInt(d, view.lights, valid, offset); };
-  const Triangle<D> triangle = TriangleVertices(d, view.geometry, field(offsetof(Light, placement)),
-                                                field(offsetof(Light, primitive)));
+  const auto or_first = [&](Int<D> value, int32_t first) HWY_ATTR {
+    return hn::IfThenElse(ToIntMask(d, active), value, hn::Set(IntTag<D>(), first));
+  };
+  const Triangle<D> triangle =
+      TriangleVertices(d, view.geometry, or_first(name.placement, view.lights->placement),
+                       or_first(name.primitive, view.lights->primitive));
   const TriangleLightSample<D> s =
       SampleTriangleLight(d, triangle.p0, triangle.p1, triangle.p2, ref, u);
-  const auto one_sided =
-      ToMask(d, hn::Eq(field(offsetof(Light, type)),
-                       hn::Set(IntTag<D>(), static_cast<int32_t>(LightType::triangle))));
   const Mask<D> behind =
       hn::Ge(Dot(TriangleAreaNormal<D>(triangle), Sub<D>(triangle.p0, ref)), hn::Zero(d));
   LightSample<D> sample = NoLight(d);
   sample.wi = s.wi;
   sample.distance = s.distance;
   sample.radiance_or_irradiance = Splat3(d, 1, 1, 1);
-  sample.pdf = hn::IfThenZeroElse(hn::And(one_sided, behind), s.pdf);
+  sample.pdf = hn::IfThenZeroElse(hn::And(name.one_sided, behind), s.pdf);
   sample.light = light;
   sample.b1 = s.b1;
   sample.b2 = s.b2;
@@ -184,12 +199,11 @@ HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active
   if (hn::AllFalse(d, has_light)) return sample;
 
   const Int<D> light = hn::IfThenElseZero(ToIntMask(d, has_light), pick.light);
-  const Int<D> type = FieldInt(d, view.lights, light, offsetof(Light, type));
-  const Mask<D> triangle =
-      hn::And(has_light, ToMask(d, hn::Lt(type, hn::Set(di, kLastTriangleType + 1))));
+  const LightName<D> name = LoadLightName(d, view, light);
+  const Mask<D> triangle = hn::And(has_light, name.triangle);
   const Mask<D> punctual = hn::AndNot(triangle, has_light);
   if (!hn::AllFalse(d, triangle)) {
-    sample = Merge(d, triangle, sample, FromTriangle(d, view, triangle, light, position, u));
+    sample = Merge(d, triangle, sample, FromTriangle(d, view, triangle, light, name, position, u));
   }
   if (!hn::AllFalse(d, punctual)) {
     sample = Merge(d, punctual, sample, FromPunctual(d, view, light, position));

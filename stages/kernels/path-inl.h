@@ -112,15 +112,19 @@ HWY_INLINE void StoreVec3(D d, const LaneList<D>& list, size_t offset, const Vec
 template <class D, class X, class Y, class Z, class W>
 HWY_INLINE void StoreQuad(D d, const LaneList<D>& list, size_t offset, X x, Y y, Z z, W w) {
   constexpr size_t kLanes = LaneList<D>::kLanes;
-  HWY_ALIGN float words[4][kLanes];
-  hn::Store(hn::BitCast(d, x), d, words[0]);
-  hn::Store(hn::BitCast(d, y), d, words[1]);
-  hn::Store(hn::BitCast(d, z), d, words[2]);
-  hn::Store(hn::BitCast(d, w), d, words[3]);
+  static_assert(kLanes == 1 || kLanes >= 4);
+  HWY_ALIGN float words[4 * kLanes];
+  if constexpr (kLanes >= 4) {
+    hn::StoreInterleaved4(hn::BitCast(d, x), hn::BitCast(d, y), hn::BitCast(d, z),
+                          hn::BitCast(d, w), d, words);
+  } else {
+    hn::Store(hn::BitCast(d, x), d, words);
+    hn::Store(hn::BitCast(d, y), d, words + 1);
+    hn::Store(hn::BitCast(d, z), d, words + 2);
+    hn::Store(hn::BitCast(d, w), d, words + 3);
+  }
   for (size_t i = 0; i < list.count; ++i) {
-    const size_t lane = list.lane[i];
-    const float four[4] = {words[0][lane], words[1][lane], words[2][lane], words[3][lane]};
-    std::memcpy(reinterpret_cast<char*>(list.path[i]) + offset, four, 16);
+    std::memcpy(reinterpret_cast<char*>(list.path[i]) + offset, &words[4 * list.lane[i]], 16);
   }
 }
 

@@ -184,7 +184,7 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> a
   const Vec3<D> emitted = EmittedRadiance(d, c, v.at, v.footprint.uv, active);
   Real<D> weight = Splat(d, 1);
   const IntTag<D> di;
-  const Int<D> first_light = FieldInt(d, v.at.placement, offsetof(Placement, first_light));
+  const Int<D> first_light = v.at.placement.first_light;
   const Mask<D> sampled =
       hn::And(hn::And(active, IsPresent(d, first_light)), hn::Gt(v.ray_pdf, hn::Zero(d)));
   if (!hn::AllFalse(d, sampled)) {
@@ -234,18 +234,14 @@ HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const lights::Li
   const Mask<D> is_light = hn::And(active, IsPresent(d, light.light));
   if (hn::AllFalse(d, is_light)) return light.radiance_or_irradiance;
   const Int<D> valid = hn::IfThenElseZero(hn::RebindMask(di, is_light), light.light);
-  const Int<D> type = FieldInt(d, c.lights.lights, valid, offsetof(Light, type));
-  const Mask<D> triangle =
-      hn::And(is_light, hn::RebindMask(d, hn::Lt(type, hn::Set(di, kLastTriangleType + 1))));
+  const lights::LightName<D> name = lights::LoadLightName(d, c.lights, valid);
+  const Mask<D> triangle = hn::And(is_light, name.triangle);
   if (hn::AllFalse(d, triangle)) return light.radiance_or_irradiance;
 
-  const auto field = [&](size_t offset) HWY_ATTR {
-    return hn::IfThenElseZero(hn::RebindMask(di, triangle),
-                              FieldInt(d, c.lights.lights, valid, offset));
-  };
+  const auto where = hn::RebindMask(di, triangle);
   const SurfacePoint<D> at =
-      MakeSurfacePoint(d, c, field(offsetof(Light, placement)), field(offsetof(Light, primitive)),
-                       light.b1, light.b2);
+      MakeSurfacePoint(d, c, hn::IfThenElseZero(where, name.placement),
+                       hn::IfThenElseZero(where, name.primitive), light.b1, light.b2);
   const Vec2<D> uv = TextureCoordinates(d, c, at, hn::Zero(di));
   const Vec3<D> emitted = EmittedRadiance(d, c, at, uv, triangle);
   return Select<D>(triangle, Mul<D>(light.radiance_or_irradiance, emitted),
@@ -356,7 +352,8 @@ HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s,
   const Real<D> zero = hn::Zero(d);
   const LaneList<D> list = ListLanes(d, v.path, lanes);
   if (hn::AllFalse(d, hn::Or(shadow.wanted, bounce.alive))) {
-    StoreVec3(d, list, offsetof(PathState, radiance), v.radiance);
+    StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
+              v.cone_spread);
     for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
     return;
   }
@@ -391,7 +388,8 @@ HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s,
 template <class D>
 HWY_INLINE void EndPaths(D d, const Vertex<D>& v, Mask<D> lanes, Next* next) {
   const LaneList<D> list = ListLanes(d, v.path, lanes);
-  StoreVec3(d, list, offsetof(PathState, radiance), v.radiance);
+  StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
+            v.cone_spread);
   for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
 }
 
@@ -523,8 +521,11 @@ HWY_INLINE void ShadePaths(D d, const KernelContext& c, PathState* paths,
 template <class D>
 HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
   if (c.lights.environment.width == 0) return;
-  const Vec3<D> direction = PathVec3(d, p, offsetof(PathState, direction));
-  const Real<D> pdf = PathReal(d, p, offsetof(PathState, pdf));
+  const Quad<D> ray = PathQuad(d, p, offsetof(PathState, direction));       // and pdf
+  const Quad<D> through = PathQuad(d, p, offsetof(PathState, throughput));  // and cone_width
+  const Quad<D> gathered = PathQuad(d, p, offsetof(PathState, radiance));   // and cone_spread
+  const Vec3<D> direction = {ray.x, ray.y, ray.z};
+  const Real<D> pdf = ray.w;
   const Mask<D> bounced = hn::Gt(pdf, hn::Zero(d));
   const EnvironmentValue<D> environment = LookUpEnvironment(d, c.lights.environment, direction);
   const Real<D> light_pdf = environment.pdf * Splat(d, c.lights.environment_probability);
@@ -534,10 +535,11 @@ HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
     c.probe->emission_light_pdf = static_cast<float>(hn::GetLane(light_pdf));
     c.probe->emission_weight = static_cast<float>(hn::GetLane(weight));
   }
-  const Vec3<D> throughput = PathVec3(d, p, offsetof(PathState, throughput));
-  const Vec3<D> sum = Add<D>(PathVec3(d, p, offsetof(PathState, radiance)),
-                             Scale(Mul<D>(throughput, environment.radiance), weight));
-  StoreVec3(d, ListLanes(d, p, p.active), offsetof(PathState, radiance), sum);
+  const Vec3<D> throughput = {through.x, through.y, through.z};
+  const Vec3<D> before = {gathered.x, gathered.y, gathered.z};
+  const Vec3<D> sum = Add<D>(before, Scale(Mul<D>(throughput, environment.radiance), weight));
+  StoreQuad(d, ListLanes(d, p, p.active), offsetof(PathState, radiance), sum.x, sum.y, sum.z,
+            gathered.w);
 }
 
 /// Opacity of one point for shadow rays, from the finest mip level.

@@ -21,7 +21,7 @@ namespace carpool::stages::HWY_NAMESPACE {
 /// A point on a triangle of the scene, by barycentrics of vertices 1 and 2.
 template <class D>
 struct SurfacePoint {
-  Records<Placement, D> placement;
+  PlacementLanes<D> placement;
   Records<Material, D> material;
   TriangleIndices<D> index;
   Real<D> b0, b1, b2;
@@ -31,10 +31,10 @@ template <class D>
 HWY_INLINE SurfacePoint<D> MakeSurfacePoint(D d, const KernelContext& c, Int<D> placement,
                                             Int<D> primitive, Real<D> b1, Real<D> b2) {
   const Real<D> b0 = hn::Max(Splat(d, 1) - b1 - b2, hn::Zero(d));
-  const Records<Placement, D> record = MakeRecords(d, c.geometry.placements, placement);
-  return {record,
-          MakeRecords(d, c.materials, FieldInt(d, record, offsetof(Placement, material))),
-          GatherTriangleIndices(d, c.geometry, record, primitive),
+  const PlacementLanes<D> lanes = LoadPlacements(d, c.geometry.placements, placement);
+  return {lanes,
+          MakeRecords(d, c.materials, lanes.material),
+          GatherTriangleIndices(d, c.geometry, lanes, primitive),
           b0,
           b1,
           b2};
@@ -87,12 +87,6 @@ HWY_INLINE Vec3<D> VectorToWorld(D d, const Records<Placement, D>& placement, co
 }
 
 template <class D>
-HWY_INLINE Mask<D> PlacementHas(D d, const Records<Placement, D>& placement, int32_t flag) {
-  const Int<D> flags = FieldInt(d, placement, offsetof(Placement, flags));
-  return hn::RebindMask(d, hn::TestBit(flags, hn::Set(IntTag<D>(), flag)));
-}
-
-template <class D>
 HWY_INLINE Vec3<D> MaxAbs3(const Triangle<D>& t) {
   const auto most = [](Real<D> a, Real<D> b, Real<D> c)
                         HWY_ATTR { return hn::Max(hn::Abs(a), hn::Max(hn::Abs(b), hn::Abs(c))); };
@@ -132,7 +126,7 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
   Surface<D> s;
   s.triangle = t;
   s.position = MulAdd(t.p1, at.b1, MulAdd(t.p2, at.b2, Scale(t.p0, at.b0)));
-  s.error = PositionError(d, at.placement, instanced, t);
+  s.error = PositionError(d, at.placement.record, instanced, t);
 
   const Vec3<D> toward = Neg<D>(ray_direction);
   const Vec3<D> area_normal = TriangleAreaNormal(t);
@@ -141,7 +135,7 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
   s.back = hn::Lt(Dot(front, toward), hn::Zero(d));
   s.geometric = Select<D>(s.back, Neg<D>(front), front);
 
-  const Int<D> normals = FieldInt(d, at.placement, offsetof(Placement, normals));
+  const Int<D> normals = at.placement.normals;
   const Mask<D> smooth = IsPresent(d, normals);
   s.shading = s.geometric;
   if (!hn::AllFalse(d, smooth)) {
@@ -151,7 +145,7 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
     };
     Vec3<D> n = Interpolate<D>(at, vertex(at.index.i0), vertex(at.index.i1), vertex(at.index.i2));
     if (!hn::AllFalse(d, instanced)) {
-      n = Select<D>(instanced, NormalToWorld(d, at.placement, n), n);
+      n = Select<D>(instanced, NormalToWorld(d, at.placement.record, n), n);
     }
     n = SafeNormalize(d, n, front);
     n = Select<D>(s.back, Neg<D>(n), n);
@@ -170,8 +164,7 @@ template <class D>
 HWY_INLINE TextureTriangle<D> GatherTextureTriangle(D d, const KernelContext& c,
                                                     const SurfacePoint<D>& at, Int<D> set) {
   const IntTag<D> di;
-  const Int<D> uvs = FieldInt(d, at.placement, offsetof(Placement, uvs));
-  const Int<D> sets = FieldInt(d, at.placement, offsetof(Placement, uv_sets));
+  const Int<D> uvs = at.placement.uvs, sets = at.placement.uv_sets;
   TextureTriangle<D> t;
   t.present = hn::And(IsPresent(d, uvs), hn::RebindMask(d, hn::Lt(set, sets)));
   if (hn::AllFalse(d, t.present)) {
@@ -255,7 +248,7 @@ HWY_INLINE Rgba<D> BaseColor(D d, const KernelContext& c, const SurfacePoint<D>&
   const Rgba<D> texel = MaterialTexture(d, c, at, footprint, Slot::base_color, active, 1);
   Rgba<D> color = {Mul<D>(factor, texel.rgb), alpha * texel.a};
 
-  const Int<D> colors = FieldInt(d, at.placement, offsetof(Placement, colors));
+  const Int<D> colors = at.placement.colors;
   const Mask<D> colored = hn::And(active, IsPresent(d, colors));
   if (!hn::AllFalse(d, colored)) {
     const Int<D> base = hn::Max(colors, hn::Zero(IntTag<D>()));
@@ -311,7 +304,7 @@ HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<
                                 const Surface<D>& s, const TextureFootprint<D>& footprint,
                                 Mask<D> active) {
   const IntTag<D> di;
-  const Int<D> tangents = FieldInt(d, at.placement, offsetof(Placement, tangents));
+  const Int<D> tangents = at.placement.tangents;
   const Int<D> slot =
       FieldInt(d, at.material, offsetof(Material, slots) + 4 * static_cast<size_t>(Slot::normal));
   active = hn::And(active, hn::And(IsPresent(d, tangents), IsPresent(d, slot)));
@@ -333,7 +326,7 @@ HWY_INLINE Vec3<D> MappedNormal(D d, const KernelContext& c, const SurfacePoint<
   Real<D> handedness = t0.w;
   const Mask<D> instanced = PlacementHas(d, at.placement, kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
-    tangent = Select<D>(instanced, VectorToWorld(d, at.placement, tangent), tangent);
+    tangent = Select<D>(instanced, VectorToWorld(d, at.placement.record, tangent), tangent);
     const Mask<D> mirrored = PlacementHas(d, at.placement, kPlacementMirrored);
     handedness = hn::IfThenElse(mirrored, hn::Neg(handedness), handedness);
   }

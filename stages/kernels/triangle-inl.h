@@ -25,6 +25,47 @@ struct Triangle {
   Mask<D> mirrored;  // the placement's transform turns the winding over
 };
 
+/// One placement per lane: its integers, and the record that its transforms are read from.
+template <class D>
+struct PlacementLanes {
+  Records<Placement, D> record;
+  Int<D> first_index, positions, normals, tangents;
+  Int<D> uvs, uv_sets, colors, material;
+  Int<D> flags, first_light;
+};
+
+/// `index` must be valid in every lane.
+template <class D>
+HWY_INLINE PlacementLanes<D> LoadPlacements(D d, const Placement* base, Int<D> index) {
+  const Records<Placement, D> record = MakeRecords(d, base, index);
+  if (hn::MaxLanes(D()) < 4 || record.same != nullptr) {
+    const auto field = [&](size_t offset) HWY_ATTR { return FieldInt(d, record, offset); };
+    return {record,
+            field(offsetof(Placement, first_index)),
+            field(offsetof(Placement, positions)),
+            field(offsetof(Placement, normals)),
+            field(offsetof(Placement, tangents)),
+            field(offsetof(Placement, uvs)),
+            field(offsetof(Placement, uv_sets)),
+            field(offsetof(Placement, colors)),
+            field(offsetof(Placement, material)),
+            field(offsetof(Placement, flags)),
+            field(offsetof(Placement, first_light))};
+  }
+  const IntQuad<D> a = FieldIntQuad(d, base, index, offsetof(Placement, first_index));
+  const IntQuad<D> b = FieldIntQuad(d, base, index, offsetof(Placement, uvs));
+  const IntQuad<D> c = FieldIntQuad(d, base, index, offsetof(Placement, flags));
+  return {record, a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.z};
+}
+static_assert(offsetof(Placement, tangents) == offsetof(Placement, first_index) + 12 &&
+              offsetof(Placement, material) == offsetof(Placement, uvs) + 12 &&
+              offsetof(Placement, first_light) == offsetof(Placement, flags) + 8);
+
+template <class D>
+HWY_INLINE Mask<D> PlacementHas(D d, const PlacementLanes<D>& placement, int32_t flag) {
+  return hn::RebindMask(d, hn::TestBit(placement.flags, hn::Set(IntTag<D>(), flag)));
+}
+
 /// Vertex numbers (within the shape) of triangle `primitive` of `placement`.
 template <class D>
 struct TriangleIndices {
@@ -33,19 +74,11 @@ struct TriangleIndices {
 
 template <class D>
 HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& view,
-                                                    const Records<Placement, D>& placement,
+                                                    const PlacementLanes<D>& placement,
                                                     Int<D> primitive) {
-  const IntTag<D> di;
-  const Int<D> first =
-      FieldInt(d, placement, offsetof(Placement, first_index)) + primitive * hn::Set(di, 3);
-  if constexpr (hn::MaxLanes(D()) < 4) {
-    return {GatherInt(d, view.indices, first), GatherInt(d, view.indices, first + hn::Set(di, 1)),
-            GatherInt(d, view.indices, first + hn::Set(di, 2))};
-  } else {
-    // As the bits of floats, which only travel.
-    const Vec3<D> bits = GatherTriple(d, reinterpret_cast<const float*>(view.indices), first);
-    return {hn::BitCast(di, bits.x), hn::BitCast(di, bits.y), hn::BitCast(di, bits.z)};
-  }
+  const Int<D> first = placement.first_index + primitive * hn::Set(IntTag<D>(), 3);
+  const IntQuad<D> q = GatherIntQuad(d, view.indices, first);  // one more than there are: padded
+  return {q.x, q.y, q.z};
 }
 
 /// The rows of a 3x4 matrix.
@@ -69,35 +102,29 @@ HWY_INLINE Vec3<D> TransformPoint(const Affine<D>& m, const Vec3<D>& p) {
 /// The triangle's vertices in world space. Every lane needs a valid placement and primitive.
 template <class D>
 HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view,
-                                        const Records<Placement, D>& placement,
+                                        const PlacementLanes<D>& placement,
                                         const TriangleIndices<D>& index) {
-  const IntTag<D> di;
-  const Int<D> base = FieldInt(d, placement, offsetof(Placement, positions));
   const auto vertex = [&](Int<D> i) HWY_ATTR {
-    return GatherTriple(d, view.floats, base + i * hn::Set(di, 3));
+    return GatherTriple(d, view.floats, placement.positions + i * hn::Set(IntTag<D>(), 3));
   };
   Vec3<D> p0 = vertex(index.i0), p1 = vertex(index.i1), p2 = vertex(index.i2);
 
-  const Int<D> flags = FieldInt(d, placement, offsetof(Placement, flags));
-  const auto has = [&](int32_t flag) HWY_ATTR {
-    return hn::RebindMask(d, hn::TestBit(flags, hn::Set(di, flag)));
-  };
-  const Mask<D> instanced = has(kPlacementInstanced);
+  const Mask<D> instanced = PlacementHas(d, placement, kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
     // Flat lanes keep their vertices: going through an identity would cost them a rounding of -0.
-    const Affine<D> to_world = ObjectToWorld(d, view, placement.index);
+    const Affine<D> to_world = ObjectToWorld(d, view, placement.record.index);
     p0 = Select<D>(instanced, TransformPoint<D>(to_world, p0), p0);
     p1 = Select<D>(instanced, TransformPoint<D>(to_world, p1), p1);
     p2 = Select<D>(instanced, TransformPoint<D>(to_world, p2), p2);
   }
-  return {p0, p1, p2, has(kPlacementMirrored)};
+  return {p0, p1, p2, PlacementHas(d, placement, kPlacementMirrored)};
 }
 
 template <class D>
 HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view, Int<D> placement,
                                         Int<D> primitive) {
-  const Records<Placement, D> record = MakeRecords(d, view.placements, placement);
-  return TriangleVertices(d, view, record, GatherTriangleIndices(d, view, record, primitive));
+  const PlacementLanes<D> lanes = LoadPlacements(d, view.placements, placement);
+  return TriangleVertices(d, view, lanes, GatherTriangleIndices(d, view, lanes, primitive));
 }
 
 /// Twice the triangle's area times its geometric normal, on the side that glTF calls the front.

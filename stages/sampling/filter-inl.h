@@ -21,9 +21,8 @@ HWY_INLINE Real<D> SampleFilterAxis(D d, Real<D> u) {
   const Real<D> position = u * Splat(d, kPixelFilterCells);
   const Index<D> cell = ToIndex(d, position);
   const float* knots = kPixelFilterKnots.data();
-  const Real<D> low = LookUpFloat(d, knots, cell);
-  const Real<D> high = LookUpFloat(d, knots + 1, cell);
-  return hn::MulAdd(position - FromIndex(d, cell), high - low, low);
+  const Vec2<D> ends = LookUpFloatPair(d, knots, cell);
+  return hn::MulAdd(position - FromIndex(d, cell), ends.y - ends.x, ends.x);
 }
 
 /// Offset from the pixel's centre, in pixels.

@@ -36,8 +36,8 @@ constexpr double InverseCumulative(double mass) {
   return 0.5 * (low + high);
 }
 
-constexpr std::array<float, kPixelFilterCells + 1> MakeKnots() {
-  std::array<float, kPixelFilterCells + 1> knots{};
+constexpr PixelFilterKnots MakeKnots() {
+  PixelFilterKnots knots{};
   constexpr int half = kPixelFilterCells / 2;
   for (int k = 1; k <= half; ++k) {
     const double t = k == half ? 1 : InverseCumulative(0.5 + 0.5 * k / half);
@@ -49,6 +49,6 @@ constexpr std::array<float, kPixelFilterCells + 1> MakeKnots() {
 
 }  // namespace
 
-constexpr std::array<float, kPixelFilterCells + 1> kPixelFilterKnots = MakeKnots();
+constexpr PixelFilterKnots kPixelFilterKnots = MakeKnots();
 
 }  // namespace carpool::stages

@@ -12,7 +12,8 @@ constexpr int kPixelFilterCells = 256;
 
 /// Knot k is the offset in pixels below which k/256 of the filter's mass lies. Between knots the
 /// offset is linear, so the filter in force is the window averaged over cells of equal mass; that
-/// filter is sampled exactly.
-extern const std::array<float, kPixelFilterCells + 1> kPixelFilterKnots;
+/// filter is sampled exactly. Behind the last knot are two numbers more: kernels load four at once.
+using PixelFilterKnots = std::array<float, kPixelFilterCells + 1 + 2>;
+extern const PixelFilterKnots kPixelFilterKnots;
 
 }  // namespace carpool::stages

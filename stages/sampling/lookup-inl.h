@@ -14,6 +14,7 @@
 #include <cstdint>
 
 #include "stages/simd/lanes-inl.h"
+#include "stages/simd/quads-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
@@ -76,6 +77,42 @@ HWY_INLINE Real<D> LookUpFloat(D d, const float* HWY_RESTRICT table, Index<D> in
 template <class D>
 HWY_INLINE Index<D> LookUpWord(D, const int32_t* HWY_RESTRICT table, Index<D> index) {
   return LookUp(IndexTag<D>(), table, index);
+}
+
+/// table[index] and its successors, which one load per lane brings where lanes are four floats or
+/// more. All of four words must be readable, also of a pair.
+template <class D>
+struct WordPair {
+  Index<D> first, second;
+};
+template <class D>
+constexpr bool kLoadsQuads = sizeof(hn::TFromD<D>) == 4 && hn::MaxLanes(D()) >= 4;
+
+template <class D>
+HWY_INLINE Quad<D> LookUpQuad(D d, const float* HWY_RESTRICT table, Index<D> index) {
+  if constexpr (kLoadsQuads<D>) {
+    return GatherQuad(d, table, index);
+  } else {
+    return {LookUpFloat(d, table, index), LookUpFloat(d, table + 1, index),
+            LookUpFloat(d, table + 2, index), LookUpFloat(d, table + 3, index)};
+  }
+}
+template <class D>
+HWY_INLINE Vec2<D> LookUpFloatPair(D d, const float* HWY_RESTRICT table, Index<D> index) {
+  if constexpr (kLoadsQuads<D>) {
+    return GatherPair(d, table, index);
+  } else {
+    return {LookUpFloat(d, table, index), LookUpFloat(d, table + 1, index)};
+  }
+}
+template <class D>
+HWY_INLINE WordPair<D> LookUpWordPair(D d, const int32_t* HWY_RESTRICT table, Index<D> index) {
+  if constexpr (kLoadsQuads<D>) {
+    const IntPair<D> pair = GatherIntPair(d, table, index);
+    return {pair.x, pair.y};
+  } else {
+    return {LookUpWord(d, table, index), LookUpWord(d, table + 1, index)};
+  }
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

@@ -85,6 +85,8 @@ template <class... A>
 Never InterleaveUpper(A...);
 template <class... A>
 Never GatherIndex(A...);
+template <class... A>
+void StoreInterleaved4(A...);
 
 /// A float as double, whatever its bits: words that are no numbers may stand where reals are read
 /// and must neither trap nor count.

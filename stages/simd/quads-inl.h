@@ -60,6 +60,43 @@ HWY_INLINE Quad<D> GatherQuad(D d, const float* HWY_RESTRICT base, Int<D> index)
   }
 }
 
+/// Four integers per lane.
+template <class D>
+struct IntQuad {
+  Int<D> x, y, z, w;
+};
+
+/// base[index], ... base[index + 3]; `index` counts words. All four must be readable in every lane.
+/// They travel as the bits of floats, which loads and shuffles leave alone.
+template <class D>
+HWY_INLINE IntQuad<D> GatherIntQuad(D d, const void* HWY_RESTRICT base, Int<D> index) {
+  const IntTag<D> di;
+  if constexpr (hn::MaxLanes(D()) < 4) {
+    const auto word = [&](int32_t k)
+                          HWY_ATTR { return GatherInt(d, base, index + hn::Set(di, k)); };
+    return {word(0), word(1), word(2), word(3)};
+  } else {
+    const Quad<D> q = GatherQuad(d, static_cast<const float*>(base), index);
+    return {hn::BitCast(di, q.x), hn::BitCast(di, q.y), hn::BitCast(di, q.z), hn::BitCast(di, q.w)};
+  }
+}
+
+/// Two integers per lane: base[index] and base[index + 1]. Reads two words more where lanes are
+/// four or more.
+template <class D>
+struct IntPair {
+  Int<D> x, y;
+};
+template <class D>
+HWY_INLINE IntPair<D> GatherIntPair(D d, const void* HWY_RESTRICT base, Int<D> index) {
+  if constexpr (hn::MaxLanes(D()) < 4) {
+    return {GatherInt(d, base, index), GatherInt(d, base, index + hn::Set(IntTag<D>(), 1))};
+  } else {
+    const IntQuad<D> q = GatherIntQuad(d, base, index);
+    return {q.x, q.y};
+  }
+}
+
 /// base[index], base[index + 1], base[index + 2]. Reads one float more where lanes are four or
 /// more.
 template <class D>
@@ -89,6 +126,16 @@ HWY_INLINE Quad<D> FieldQuad(D d, const Record* HWY_RESTRICT base, Int<D> index,
   const IntTag<D> di;
   return GatherQuad(d, reinterpret_cast<const float*>(base) + offset / 4,
                     index * hn::Set(di, static_cast<int32_t>(sizeof(Record) / 4)));
+}
+
+/// The four integers from byte `offset` of record `index`.
+template <class Record, class D>
+HWY_INLINE IntQuad<D> FieldIntQuad(D d, const Record* HWY_RESTRICT base, Int<D> index,
+                                   size_t offset) {
+  static_assert(sizeof(Record) % 4 == 0);
+  const IntTag<D> di;
+  return GatherIntQuad(d, reinterpret_cast<const int32_t*>(base) + offset / 4,
+                       index * hn::Set(di, static_cast<int32_t>(sizeof(Record) / 4)));
 }
 
 /// The integer in word `word`, from byte `offset`, of a quad that was loaded from there. Where a

@@ -46,7 +46,8 @@ struct BsdfTablesView {
 };
 
 struct BsdfTables {
-  std::array<int32_t, kAlbedoRoughnesses * kAlbedoCosines> albedo;
+  /// Two words more than entries: kernels load four at once.
+  std::array<int32_t, kAlbedoRoughnesses * kAlbedoCosines + 2> albedo;
   std::array<float, kAverageRoughnesses * kAverageColumns> average;
 
   BsdfTablesView View() const { return {albedo.data(), average.data()}; }

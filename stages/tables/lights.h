@@ -50,6 +50,7 @@ static_assert(sizeof(LightNode) == 64);
 /// Selection masses of an environment table are integers whose sum is this: the grid of a 24-bit
 /// float in [0, 1), so that a table is inverted without any rounding.
 constexpr int32_t kEnvironmentMass = 1 << 24;
+constexpr int32_t kTablePadding = 3;  // words behind each table below: kernels load four at once
 
 /// Inverting a table starts from its guide (Chen & Asau 1974, "On Generating Random Variates from
 /// an Empirical Distribution"): numbers are divided into 2^bits equal cells, and entry k of the
@@ -72,6 +73,7 @@ struct Environment {
   /// 4 floats a texel: RGB in cd/m2, finite and >= 0, then P(row) P(column | row), the probability
   /// that sampling selects this texel: > 0 wherever RGB is. At most 2^29 texels.
   std::vector<float> texels;
+  /// Behind each of these are kTablePadding words more.
   std::vector<int32_t> row_cdf;       // height entries: exclusive cumulative mass of rows
   std::vector<int32_t> column_cdf;    // width * height: exclusive cumulative mass within each row
   std::vector<int32_t> row_guide;     // GuideSize(height) entries
