@@ -251,10 +251,11 @@ void Wavefront::MissKernel(const Batch<Slot>& batch, Emitter& out) {
 void Wavefront::FilmKernel(const Batch<Slot>& batch) {
   const FlushDenormals denormals;
   constexpr size_t kAhead = 8;
+  FilmAccumulator::Writer film(*c_.film);
   for (size_t i = 0; i < batch.items.size(); ++i) {
     if (i + kAhead < batch.items.size()) c_.film->Prefetch(paths_[batch.items[i + kAhead]].pixel);
     const PathState& path = paths_[batch.items[i]];
-    c_.film->Add(path.pixel, path.sample, path.radiance);
+    film.Add(path.pixel, path.sample, path.radiance);
   }
   pool_.Give(batch.worker, batch.items);
 }

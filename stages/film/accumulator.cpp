@@ -27,10 +27,6 @@ void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
   high = static_cast<int16_t>(high + (low < old ? 1 : 0) + (value < 0 ? -1 : 0));
 }
 
-// The top bit of a pixel's sample count is its lock: one atomic exchange instead of four atomic
-// sums. Two threads meet on one pixel almost never, and then for a few nanoseconds.
-constexpr uint32_t kLocked = 1u << 31;
-
 /// What a film of floats would keep.
 void RoundToFloat(FilmPixel& pixel) {
   for (int i = 0; i < kScrambles * 3; ++i) {
@@ -41,20 +37,6 @@ void RoundToFloat(FilmPixel& pixel) {
   }
 }
 
-/// Returns the sample count.
-uint32_t Lock(FilmPixel& pixel) {
-  std::atomic_ref<uint32_t> state(pixel.samples);
-  for (;;) {
-    const uint32_t seen = state.fetch_or(kLocked, std::memory_order_acquire);
-    if ((seen & kLocked) == 0) return seen;
-    while ((state.load(std::memory_order_relaxed) & kLocked) != 0) {
-    }
-  }
-}
-void Unlock(FilmPixel& pixel, uint32_t samples) {
-  std::atomic_ref<uint32_t>(pixel.samples).store(samples, std::memory_order_release);
-}
-
 }  // namespace
 
 FilmAccumulator::FilmAccumulator(uint32_t width, uint32_t height, const FilmPlanes& planes,
@@ -63,7 +45,8 @@ FilmAccumulator::FilmAccumulator(uint32_t width, uint32_t height, const FilmPlan
       height_(height),
       planes_(planes),
       clamp_(clamp),
-      largest_(std::min(clamp, static_cast<float>(kFilmLargest))) {
+      largest_(std::min(clamp, static_cast<float>(kFilmLargest))),
+      locks_(width) {
   const size_t count = size_t{width} * height;
   pixels_.resize(count);
   if (planes.albedo) albedo_.resize(count * 3);
@@ -120,7 +103,17 @@ void FilmAccumulator::Mend(uint32_t pixel, uint32_t sample, double channels[3]) 
   }
 }
 
-void FilmAccumulator::Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
+void FilmAccumulator::Writer::Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
+  const uint32_t lock = film_.locks_.Of(pixel);
+  if (lock != held_) {
+    Release();
+    film_.locks_.Lock(lock);
+    held_ = lock;
+  }
+  film_.AddLocked(pixel, sample, radiance);
+}
+
+void FilmAccumulator::AddLocked(uint32_t pixel, uint32_t sample, const float radiance[3]) {
   const int first = static_cast<int>(sample % kScrambles) * 3;
   double channels[3] = {radiance[0], radiance[1], radiance[2]};
   bool plain = true;
@@ -130,10 +123,9 @@ void FilmAccumulator::Add(uint32_t pixel, uint32_t sample, const float radiance[
   int64_t fixed[3];
   for (int c = 0; c < 3; ++c) fixed[c] = ToFixed(channels[c]);
   FilmPixel& p = pixels_[pixel];
-  const uint32_t samples = Lock(p);
   for (int c = 0; c < 3; ++c) AddFixed(p.low[first + c], p.high[first + c], fixed[c]);
   if (IsMutant(Mutant::float_film)) RoundToFloat(p);
-  Unlock(p, samples + 1);
+  ++p.samples;
 }
 
 SampleLedger FilmAccumulator::Ledger() const {

@@ -8,6 +8,7 @@
 #include <mutex>
 #include <vector>
 
+#include "stages/film/tile_locks.h"
 #include "stages/tables/huge_pages.h"
 
 namespace carpool::stages {
@@ -21,7 +22,7 @@ constexpr double kFilmLargest = 0x1p30;   // larger channels are clamped and cou
 struct alignas(64) FilmPixel {
   uint64_t low[kScrambles * 3];
   int16_t high[kScrambles * 3];
-  uint32_t samples;  // below 2^31: the top bit is a lock while a sample is being added
+  uint32_t samples;
 };
 static_assert(sizeof(FilmPixel) == 128);
 
@@ -84,9 +85,31 @@ class FilmAccumulator {
   const FilmPlanes& planes() const { return planes_; }
   uint64_t bytes() const;
 
-  /// Adds one sample of `pixel` (y * width + x). What cannot be added as it is, is entered in the
-  /// ledger.
-  void Add(uint32_t pixel, uint32_t sample, const float radiance[3]);
+  /// Adds samples, and keeps the pixels' lock for as long as they share one: neighbours in turn are
+  /// cheap. A thread may have one Writer at a time; others wait meanwhile.
+  class Writer {
+   public:
+    explicit Writer(FilmAccumulator& film) : film_(film) {}
+    ~Writer() { Release(); }
+    Writer(const Writer&) = delete;
+    Writer& operator=(const Writer&) = delete;
+
+    /// Adds one sample of `pixel` (y * width + x). What cannot be added as it is, is entered in the
+    /// ledger.
+    void Add(uint32_t pixel, uint32_t sample, const float radiance[3]);
+
+   private:
+    static constexpr uint32_t kNone = ~0u;
+    void Release() {
+      if (held_ != kNone) film_.locks_.Unlock(held_);
+    }
+
+    FilmAccumulator& film_;
+    uint32_t held_ = kNone;
+  };
+  void Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
+    Writer(*this).Add(pixel, sample, radiance);
+  }
   /// Asks for the pixel's cache lines ahead of Add.
   void Prefetch(uint32_t pixel) const {
     __builtin_prefetch(&pixels_[pixel], 1);
@@ -115,12 +138,14 @@ class FilmAccumulator {
     uint64_t first = ~uint64_t{0};  // sample, then pixel
   };
 
+  void AddLocked(uint32_t pixel, uint32_t sample, const float radiance[3]);
   void Enter(SampleFault fault, uint32_t pixel, uint32_t sample);
   void Mend(uint32_t pixel, uint32_t sample, double channels[3]);
 
   uint32_t width_, height_;
   FilmPlanes planes_;
   float clamp_, largest_;  // largest_: channels up to here are added as they are
+  TileLocks locks_;
   std::array<Fault, kSampleFaults> faults_;
   std::mutex clamp_mutex_;
   __int128 removed_[3] = {0, 0, 0};  // by the clamp, in quanta

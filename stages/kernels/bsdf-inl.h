@@ -37,6 +37,7 @@ template <class D>
 struct Bsdf : LobeSet<D, SpecularLobe, MultiScatterLobe, DiffuseLobe> {
   BsdfTablesView tables;
   AlbedoRow<D> row;  // of the base's roughness
+  bool matte;        // no lane has an interface: there is the diffuse lobe alone, and no row
 };
 
 /// Schlick's term of the dielectric and of the metal, before they are mixed.
@@ -117,16 +118,35 @@ HWY_INLINE void PrepareDiffuse(D d, const SchlickTerm<D>& dielectric,
   lobe.weight = SumComponents<D>(lobe.diffuse) * average;
 }
 
+/// What PrepareBsdf makes, to the bit, of lanes that have neither metal nor an interface that
+/// reflects: all that it multiplies by zero is left out.
+template <class D>
+HWY_INLINE Bsdf<D> PrepareMatte(D d, const BsdfTablesView& tables, const Vec3<D>& base) {
+  Bsdf<D> bsdf = {};
+  bsdf.tables = tables;
+  bsdf.matte = true;
+  bsdf.DiffuseLobe<D>::through = Splat(d, 1);
+  bsdf.DiffuseLobe<D>::diffuse = base;
+  bsdf.DiffuseLobe<D>::weight = SumComponents<D>(base);
+  bsdf.SumWeights(d);
+  return bsdf;
+}
+
 template <class D>
 HWY_INLINE Bsdf<D> PrepareBsdf(D d, const BsdfTablesView& tables, const SurfaceParams<D>& params,
                                const Vec3<D>& wo) {
-  Bsdf<D> bsdf;
-  bsdf.tables = tables;
-  bsdf.row = FindAlbedoRow<D>(d, tables, params.roughness);
   const Vec3<D> base = Clamp01<D>(d, params.base_color);
   const Real<D> metallic = hn::Min(hn::Max(params.metallic, hn::Zero(d)), Splat(d, 1));
-  const AlbedoAt<D> at_wo = LookUpAlbedo<D>(d, tables, bsdf.row, hn::Max(wo.z, hn::Zero(d)));
   const SchlickTerm<D> dielectric = DielectricInterface<D>(d, params);
+  const Real<D> reflects =
+      hn::Max(hn::Max(dielectric.f90, MaxComponent<D>(dielectric.f0)), metallic);
+  if (hn::AllFalse(d, hn::Gt(reflects, hn::Zero(d)))) return PrepareMatte<D>(d, tables, base);
+
+  Bsdf<D> bsdf;
+  bsdf.tables = tables;
+  bsdf.matte = false;
+  bsdf.row = FindAlbedoRow<D>(d, tables, params.roughness);
+  const AlbedoAt<D> at_wo = LookUpAlbedo<D>(d, tables, bsdf.row, hn::Max(wo.z, hn::Zero(d)));
   const Vec3<D> share = MultiScatterColor<D>(d, dielectric, bsdf.row.average.m);
 
   bsdf.SpecularLobe<D>::SetOutgoing(d, bsdf.row.alpha, wo);
@@ -144,7 +164,7 @@ HWY_INLINE BsdfValue<D> EvaluateBsdf(D d, const Bsdf<D>& bsdf, const Vec3<D>& wo
   DirectionPair<D> pair = MakePair(d, wo, wi);
   if (hn::AllFalse(d, pair.reflected)) return {Splat3(d, 0, 0, 0), hn::Zero(d)};
   const Real<D> users = bsdf.MultiScatterLobe<D>::weight + bsdf.DiffuseLobe<D>::weight;
-  if (!hn::AllFalse(d, hn::Gt(users, hn::Zero(d)))) {
+  if (!bsdf.matte && !hn::AllFalse(d, hn::Gt(users, hn::Zero(d)))) {
     pair.albedo = LookUpAlbedo<D>(d, bsdf.tables, bsdf.row, pair.cosine);
   }
   return bsdf.Evaluate(d, pair);
