@@ -74,6 +74,20 @@ struct Vertex {
 };
 
 template <class D>
+HWY_INLINE TextureFootprint<D> MakeFootprint(D d, const KernelContext& c, const Vertex<D>& v) {
+  const TextureTriangle<D> uvs = GatherTextureTriangle(d, c, v.at, hn::Zero(IntTag<D>()));
+  // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter
+  // takes care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and
+  // blur).
+  const Real<D> density = SafeDiv(d, TwiceTextureArea<D>(uvs), v.surface.twice_area);
+  const Real<D> least = Splat(d, 1e-30);  // a camera inside a surface, a shape without coordinates
+  return {TextureCoordinates<D>(v.at, uvs),
+          hn::MulAdd(FastLog2(d, hn::Max(density, least)), Splat(d, 0.5),
+                     FastLog2(d, hn::Max(v.cone_width, least))),
+          HashUniform(d, v.key, v.number, Purpose::texture_level, hn::Zero(UintTag<D>()))};
+}
+
+template <class D>
 HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>& p) {
   const UintTag<D> du;
   const IntTag<D> di;
@@ -104,16 +118,11 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
   v.surface = MakeSurface(d, c, v.at, direction);
 
   v.cone_width = hn::MulAdd(v.cone_spread, v.distance, through.w);
-  const TextureTriangle<D> uvs = GatherTextureTriangle(d, c, v.at, hn::Zero(di));
-  v.footprint.uv = TextureCoordinates<D>(v.at, uvs);
-  // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter
-  // takes care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and
-  // blur).
-  const Real<D> density = SafeDiv(d, TwiceTextureArea<D>(uvs), v.surface.twice_area);
-  const Real<D> least = Splat(d, 1e-30);  // a camera inside a surface, a shape without coordinates
-  v.footprint.log2_width = hn::MulAdd(FastLog2(d, hn::Max(density, least)), Splat(d, 0.5),
-                                      FastLog2(d, hn::Max(v.cone_width, least)));
-  v.footprint.u_level = HashUniform(d, v.key, v.number, Purpose::texture_level, hn::Zero(du));
+  if (MayHaveTextures(v.at.material)) {
+    v.footprint = MakeFootprint(d, c, v);
+  } else {  // nothing will be read
+    v.footprint = {{hn::Zero(d), hn::Zero(d)}, hn::Zero(d), hn::Zero(d)};
+  }
   return v;
 }
 
@@ -123,10 +132,13 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
 template <class D>
 HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha, Mask<D> active) {
   const UintTag<D> du;
-  const Uint<D> layers =
-      hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
-  const Real<D> u = HashUniform(d, v.key, v.number, Purpose::alpha, layers);
-  const Mask<D> transparent = hn::Ge(u, Opacity(d, v.at, alpha));
+  Mask<D> transparent = hn::Lt(alpha, alpha);  // never
+  if (MayBeTransparent(v.at.material)) {
+    const Uint<D> layers =
+        hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
+    const Real<D> u = HashUniform(d, v.key, v.number, Purpose::alpha, layers);
+    transparent = hn::Ge(u, Opacity(d, v.at, alpha));
+  }
   const Mask<D> camera_ray = hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(du)));
   const Mask<D> double_sided = MaterialHas(d, v.at.material, kMaterialDoubleSided);
   const Mask<D> culled = hn::And(hn::AndNot(double_sided, v.surface.back), camera_ray);
@@ -320,7 +332,8 @@ struct Bounce {
 template <class D>
 HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& v,
                                   const Scatter<D>& s, Mask<D> active) {
-  const Real<D> u_lobe = Sample1D(d, v.key, v.number, Purpose::lobe);
+  const Real<D> u_lobe =
+      s.bsdf.matte ? hn::Zero(d) : Sample1D(d, v.key, v.number, Purpose::lobe);  // one lobe: any u
   const Vec2<D> u = Sample2D(d, v.key, v.number, Purpose::bsdf);
   const BsdfSample<D> sample = SampleBsdf(d, s.bsdf, s.wo, u_lobe, u);
   if (c.probe != nullptr) c.probe->lobe = s.bsdf.ChosenLobe(d, u_lobe);

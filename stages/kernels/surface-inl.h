@@ -10,6 +10,9 @@
 #define CARPOOL_STAGES_KERNELS_SURFACE_INL_H_
 #endif
 
+#include <algorithm>
+#include <iterator>
+
 #include "stages/kernels/kernels.h"
 #include "stages/kernels/texture-inl.h"
 #include "stages/kernels/triangle-inl.h"
@@ -210,6 +213,19 @@ struct TextureFootprint {
   Real<D> log2_width;  // of the cone, in texture coordinates; very negative: finest level
   Real<D> u_level;     // chooses between neighbouring mip levels
 };
+
+/// False only if no lane's material has a texture, or if all are opaque: of a batch of one material
+/// that is known from its record.
+template <class D>
+HWY_INLINE bool MayHaveTextures(const Records<Material, D>& material) {
+  if (material.same == nullptr) return true;
+  return std::any_of(std::begin(material.same->slots), std::end(material.same->slots),
+                     [](int32_t slot) { return slot != kNone; });
+}
+template <class D>
+HWY_INLINE bool MayBeTransparent(const Records<Material, D>& material) {
+  return material.same == nullptr || material.same->alpha_mode != AlphaMode::opaque;
+}
 
 /// Reads one texture slot of each lane's material; `absent` where the material has none.
 template <class D>

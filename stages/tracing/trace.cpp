@@ -3,9 +3,12 @@
 #include "stages/tracing/trace.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
+#include <numeric>
 #include <span>
 
+#include "hwy/highway.h"
 #include "stages/tracing/layers.h"
 #include "stages/tracing/packet_size.h"
 
@@ -75,23 +78,39 @@ struct Packet {
   const PathState& Lane(int i) const { return *paths[i < count ? i : 0]; }
 };
 
-template <int kSize, class Rays, class Direction, class Far>
-void SetRays(Rays& rays, const Packet<kSize>& packet, Direction direction, Far far) {
-  for (int i = 0; i < kSize; ++i) {
-    const PathState& path = packet.Lane(i);
-    rays.org_x[i] = path.origin[0];
-    rays.org_y[i] = path.origin[1];
-    rays.org_z[i] = path.origin[2];
-    rays.dir_x[i] = direction(path)[0];
-    rays.dir_y[i] = direction(path)[1];
-    rays.dir_z[i] = direction(path)[2];
-    rays.tfar[i] = far(path);
-    rays.time[i] = 0;
-    rays.mask[i] = ~0u;
-    rays.id[i] = static_cast<unsigned>(i);
-    rays.flags[i] = 0;
+/// Four neighbouring floats of each path, the first at `offset`, to four arrays.
+template <int kSize>
+void Transpose(const Packet<kSize>& packet, size_t offset, float* x, float* y, float* z, float* w) {
+  namespace hn = hwy::HWY_NAMESPACE;
+  const hn::FixedTag<float, 4> d;
+  for (int i = 0; i < kSize; i += 4) {
+    const auto load = [&](int k) {
+      const auto* const path = reinterpret_cast<const std::byte*>(&packet.Lane(i + k));
+      return hn::Load(d, reinterpret_cast<const float*>(path + offset));
+    };
+    const auto a = load(0), b = load(1), c = load(2), e = load(3);
+    const auto ac_low = hn::InterleaveLower(d, a, c), be_low = hn::InterleaveLower(d, b, e);
+    const auto ac_high = hn::InterleaveUpper(d, a, c), be_high = hn::InterleaveUpper(d, b, e);
+    hn::Store(hn::InterleaveLower(d, ac_low, be_low), d, x + i);
+    hn::Store(hn::InterleaveUpper(d, ac_low, be_low), d, y + i);
+    hn::Store(hn::InterleaveLower(d, ac_high, be_high), d, z + i);
+    hn::Store(hn::InterleaveUpper(d, ac_high, be_high), d, w + i);
   }
 }
+
+/// The packet's rays: from the paths' origins, along the directions at `direction`. The float
+/// behind a direction goes to `behind`.
+template <int kSize, class Rays>
+void SetRays(Rays& rays, const Packet<kSize>& packet, size_t direction, float* behind) {
+  Transpose(packet, offsetof(PathState, origin), rays.org_x, rays.org_y, rays.org_z, rays.tnear);
+  Transpose(packet, direction, rays.dir_x, rays.dir_y, rays.dir_z, behind);
+  std::fill_n(rays.time, kSize, 0.0f);
+  std::fill_n(rays.mask, kSize, ~0u);
+  std::iota(rays.id, rays.id + kSize, 0u);
+  std::fill_n(rays.flags, kSize, 0u);
+}
+static_assert(offsetof(PathState, tnear) == offsetof(PathState, origin) + 12 &&
+              offsetof(PathState, shadow_distance) == offsetof(PathState, shadow_direction) + 12);
 
 template <int kSize, class RayHits>
 void NearestOfPacket(const TraceLevel& level, const Packet<kSize>& packet, RayHits& rays,
@@ -117,10 +136,8 @@ void NearestOfPacket(const TraceLevel& level, const Packet<kSize>& packet, RayHi
 template <int kSize>
 void IntersectPacket(const TraceView& view, const Packet<kSize>& packet, Coherence coherence) {
   typename EmbreePacket<kSize>::RayHit rays;
-  SetRays(
-      rays.ray, packet, [](const PathState& path) { return path.direction; },
-      [](const PathState&) { return kInfinity; });
-  for (int i = 0; i < kSize; ++i) rays.ray.tnear[i] = packet.Lane(i).tnear;
+  SetRays(rays.ray, packet, offsetof(PathState, direction), rays.ray.tfar);
+  std::fill_n(rays.ray.tfar, kSize, kInfinity);  // over what is behind the direction
   for (int i = 0; i < packet.count; ++i) packet.paths[i]->placement = kNone;
   NearestOfPacket(view.opaque, packet, rays, coherence);
   NearestOfPacket(view.transparent, packet, rays, coherence);
@@ -174,9 +191,7 @@ template <int kSize>
 void TracePacketShadows(const TraceView& view, const OpacityQuery& opacity,
                         const Packet<kSize>& packet) {
   typename EmbreePacket<kSize>::Ray rays;
-  SetRays(
-      rays, packet, [](const PathState& path) { return path.shadow_direction; },
-      [](const PathState& path) { return path.shadow_distance; });
+  SetRays(rays, packet, offsetof(PathState, shadow_direction), rays.tfar);
   std::fill_n(rays.tnear, kSize, 0.0f);
   if (view.opaque.scene != nullptr) {
     EmbreeOccluded<kSize>(packet.valid, view.opaque.scene, &rays,
