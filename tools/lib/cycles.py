@@ -9,6 +9,7 @@ line per render, with its seconds, or per pair, with its relMSE.
 
 import json
 import math
+import os
 import sys
 import time
 
@@ -35,6 +36,22 @@ def read_gltf(path):
     if data[:4] == b"glTF":
         data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
     return json.loads(data)
+
+
+def importable(path, folder):
+    """The file, or a copy without the required extensions that nothing in it uses: the importer refuses those."""
+    gltf = read_gltf(path)
+    unused = set(gltf.get("extensionsRequired", [])) - set(gltf.get("extensionsUsed", []))
+    if not unused or not path.endswith(".gltf"):
+        return path
+    gltf["extensionsRequired"] = [name for name in gltf["extensionsRequired"] if name not in unused]
+    for record in gltf.get("buffers", []) + gltf.get("images", []):
+        if "uri" in record and not record["uri"].startswith("data:"):
+            record["uri"] = os.path.join(os.path.dirname(os.path.abspath(path)), record["uri"])
+    copy = os.path.join(folder, os.path.basename(path))
+    with open(copy, "w") as file:
+        json.dump(gltf, file)
+    return copy
 
 
 def glows(record):
@@ -152,7 +169,8 @@ def relative_error(image, reference):
 
 
 def main():
-    with open(sys.argv[sys.argv.index("--") + 1]) as file:
+    job_path = sys.argv[sys.argv.index("--") + 1]
+    with open(job_path) as file:
         job = json.load(file)
     for pair in job.get("errors", []):
         error = relative_error(pair["image"], pair["reference"])
@@ -160,7 +178,7 @@ def main():
     if "scene" not in job:
         return
     scene = empty_world()
-    bpy.ops.import_scene.gltf(filepath=job["scene"])
+    bpy.ops.import_scene.gltf(filepath=importable(job["scene"], os.path.dirname(job_path)))
     set_reflectance(read_gltf(job["scene"]))
     place_camera(scene, job["view"])
     light_world(scene.world, job["environment"])
