@@ -101,21 +101,28 @@ GltfWriter Instances(int count) {
   return scene;
 }
 
+// A town at night, seen from above: lamps shine down, so that an image's noise is that of what they
+// light, not of the lamps themselves, which would be smaller than pixels.
 GltfWriter Lights(int count) {
   constexpr int kStrengths = 13;  // half decades from 1e-3 to 1e3
+  constexpr double kHalf = 100, kBlock = 8, kHouse = 4;
   GltfWriter scene;
   Random random(2);
+  const auto in_house = [](double x) { return x - kBlock * std::floor(x / kBlock) < kHouse; };
   std::vector<TriangleMesh> groups(kStrengths);
-  const double half = 10;
   for (int i = 0; i < count; ++i) {
+    double x, z;
+    do {
+      x = random.Between(-kHalf, kHalf);
+      z = random.Between(-kHalf, kHalf);
+    } while (in_house(x) && in_house(z));
     TriangleMesh& group = groups[i % kStrengths];
-    const double x = random.Between(-half, half), y = random.Between(0.5, 4),
-                 z = random.Between(-half, half);
-    for (int corner = 0; corner < 3; ++corner) {
+    const double y = random.Between(1.5, 2.5);
+    for (const auto& [dx, dz] :
+         {std::pair{-0.05, -0.05}, std::pair{0.05, -0.05}, std::pair{0.0, 0.05}}) {
       group.indices.push_back(static_cast<uint32_t>(group.positions.size()));
-      group.positions.push_back({static_cast<float>(x + random.Between(-0.03, 0.03)),
-                                 static_cast<float>(y + random.Between(-0.03, 0.03)),
-                                 static_cast<float>(z + random.Between(-0.03, 0.03))});
+      group.positions.push_back(
+          {static_cast<float>(x + dx), static_cast<float>(y), static_cast<float>(z + dz)});
     }
   }
   for (int k = 0; k < kStrengths; ++k) {
@@ -128,8 +135,18 @@ GltfWriter Lights(int count) {
     scene.AddNode(
         {{"mesh", scene.AddMesh(scene.AddShape(groups[k]), scene.AddMaterial(material), "lamps")}});
   }
-  AddPlain(scene, static_cast<float>(half));
-  scene.AddCamera("camera", {0, 6, 16}, {0, 1, 0}, 0.8);
+  AddPlain(scene, static_cast<float>(kHalf));
+  const int house = scene.AddMesh(scene.AddShape(MakeBox({0, 0, 0}, {1, 1, 1})),
+                                  scene.AddMaterial(Painted({0.6, 0.55, 0.5}, 0, 0.8)), "house");
+  const double first = -kBlock * std::floor(kHalf / kBlock);
+  for (double x = first; x < kHalf; x += kBlock) {
+    for (double z = first; z < kHalf; z += kBlock) {
+      scene.AddNode({{"mesh", house},
+                     {"translation", {x, 0, z}},
+                     {"scale", {kHouse, random.Between(2, 8), kHouse}}});
+    }
+  }
+  scene.AddCamera("camera", {0, 30, 45}, {0, 0, 0}, 0.8);
   return scene;
 }
 
