@@ -180,11 +180,15 @@ void Layout::build_levels(const Graph& graph, const RunOptions& options) {
 // keys are as many as items, choosing bins that hold two halves the number of batches. Each step is
 // a branch that nobody foresees, which waits for the item's value and throws away the work on the
 // next items: where bins are so few that blocks begin at their full size, most become full, and
-// steps of sixteen do.
+// steps of sixteen do; and where items are many to a bin, the first step is sixteen, if blocks are
+// large and have room for that from the start.
 void Layout::build_ladder(StageLayout& stage, std::uint64_t thrift, bool fine) const {
   const std::uint64_t full = round_up_to_line(std::uint64_t{stage.item_bytes} * stage.block_items);
   const std::uint64_t smallest = std::min(full, thrift / kLine * kLine);
-  std::uint64_t items = 1;
+  constexpr std::uint64_t kFirstStep = 16;
+  const bool many = stage.block_items >= 8 * kFirstStep && in_flight / slots >= 2 * kFirstStep &&
+                    smallest >= kFirstStep * stage.item_bytes;
+  std::uint64_t items = many && !fine ? kFirstStep : 1;
   std::uint32_t least = 1;
   for (std::uint32_t level = 0; level < kMaxLevels; ++level) {
     if (items * 2 > stage.block_items || level + 1 == kMaxLevels) {
