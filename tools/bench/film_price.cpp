@@ -21,27 +21,27 @@ using stages::kScrambles;
 constexpr uint32_t kSamples = 16;
 constexpr int kRounds = 5;
 
-/// Per pixel and scramble a sum of floats; one cache line.
+/// Per pixel and scramble a sum of floats; one cache line. Locks like the exact film.
 class FloatFilm {
  public:
-  explicit FloatFilm(size_t pixels) : pixels_(pixels) {}
+  FloatFilm(uint32_t width, uint32_t height) : locks_(width), pixels_(size_t{width} * height) {}
 
   void Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
+    const uint32_t lock = locks_.Of(pixel);
+    locks_.Lock(lock);
     Pixel& p = pixels_[pixel];
-    std::atomic_ref<uint32_t> lock(p.lock);
-    while (lock.exchange(1, std::memory_order_acquire) != 0) {
-    }
     float* const sums = p.sums + sample % kScrambles * 3;
     for (int c = 0; c < 3; ++c) sums[c] += radiance[c];
     ++p.samples;
-    lock.store(0, std::memory_order_release);
+    locks_.Unlock(lock);
   }
 
  private:
   struct alignas(64) Pixel {
     float sums[kScrambles * 3] = {};
-    uint32_t samples = 0, lock = 0;
+    uint32_t samples = 0;
   };
+  stages::TileLocks locks_;
   stages::HugeVector<Pixel> pixels_;
 };
 
@@ -74,7 +74,7 @@ double TimeAdding(Film& film, uint32_t width, uint32_t height, tbb::task_arena& 
 
 FilmPrice MeasureFilmPrice(uint32_t width, uint32_t height, tbb::task_arena& arena) {
   stages::FilmAccumulator exact(width, height, {});
-  FloatFilm floats(size_t{width} * height);
+  FloatFilm floats(width, height);
   std::vector<double> exact_times, float_times;
   for (int round = 0; round < kRounds + 1; ++round) {
     const double a = TimeAdding(exact, width, height, arena);
