@@ -229,6 +229,7 @@ void fan_out_formula() {
 }
 
 // One item becomes ten million, of which nobody had been told: they go to a file, and come back.
+// On one thread: a second could take them as fast as they are made.
 void spilled() {
   constexpr std::uint32_t kChildren = 10'000'000;
   carpool::Graph graph;
@@ -248,7 +249,7 @@ void spilled() {
   });
   const double begin = bench::wall_seconds();
   const carpool::RunReport report =
-      carpool::run(graph, {.threads = 2, .in_flight = 16384, .overflow = carpool::Overflow::spill});
+      carpool::run(graph, {.threads = 1, .in_flight = 16384, .overflow = carpool::Overflow::spill});
   const double seconds = bench::wall_seconds() - begin;
   if (sums[0].sum + sums[1].sum != std::uint64_t{kChildren} * (kChildren + 1) / 2) {
     std::fprintf(stderr, "bench-scheduler: spilled items were lost; this is a bug\n");
@@ -319,6 +320,7 @@ void twins(bool quick) {
 
 void costs(bool quick) {
   const Keys few{.stages = 1, .keys = 64};
+  const Keys spread{.stages = 16, .keys = 4};  // as many bins, of more stages
   const Keys many{.stages = 16, .keys = 64};
   compare(20, 1, few, false, quick);
   compare(20, 1, many, !quick, quick);
@@ -334,6 +336,10 @@ void costs(bool quick) {
   compare(100, 2, many, true);
   compare(500, 1, few, false);
   compare(500, 2, few, false);
+  for (const double kernel_ns : {20.0, 100.0, 500.0}) {
+    compare(kernel_ns, 1, spread, false);
+    compare(kernel_ns, 2, spread, false);
+  }
 }
 
 struct Group {

@@ -48,23 +48,26 @@ std::string SpeedChart(const std::vector<SceneFigures>& scenes) {
       "came or sorted (sorting counted). Blue: the wavefront, red where it loses to the "
       "megakernel. Grey: the megakernel, "
       "from the same kernels at one lane.\n<table>\n<tr><th>scene<th>share of Embree"
-      "<th>wavefront<th>megakernel<th>wavefront / megakernel<th>least..most\n";
+      "<th>wavefront<th>megakernel<th>wavefront / single rays<th>wavefront / megakernel"
+      "<th>least..most\n";
   for (const SceneFigures& f : scenes) {
     const bool lost = f.over_mega < 1;
     out += "<tr><td>" + Escape(f.scene.label) + "<td class=\"chart\">" +
            Bar(f.WaveOverEmbree(), 1, lost ? "lost" : "wave") + "<br>" +
            Bar(f.MegaOverEmbree(), 1, "mega");
-    out += Format("<td>%.2f<td>%.2f<td%s>%.2fx<td>%.2f..%.2f\n", f.WaveOverEmbree(),
-                  f.MegaOverEmbree(), lost ? " class=\"missed\"" : "", f.over_mega,
-                  f.least_over_mega, f.most_over_mega);
+    out += Format("<td>%.2f<td>%.2f<td>%.2f<td%s>%.2fx<td>%.2f..%.2f\n", f.WaveOverEmbree(),
+                  f.MegaOverEmbree(), f.wave / f.EmbreeSingles(), lost ? " class=\"missed\"" : "",
+                  f.over_mega, f.least_over_mega, f.most_over_mega);
   }
   return out + "</table>\n";
 }
 
-std::string RowTable(const std::vector<Row>& rows) {
+/// `title` is what all names begin with and the reader knows already.
+std::string RowTable(const std::vector<Row>& rows, const std::string& title) {
   std::string out = "<table>\n<tr><th>figure<th>value<th>target\n";
   for (const Row& row : rows) {
-    out += "<tr><td>" + Escape(row.name);
+    const size_t known = row.name.starts_with(title) ? title.size() : 0;
+    out += "<tr><td>" + Escape(row.name.substr(known));
     out += Format("<td%s>%.3g %s<td>%s\n", row.holds ? "" : " class=\"missed\"", row.value,
                   row.unit.c_str(), Escape(row.target).c_str());
   }
@@ -112,7 +115,8 @@ std::string LadderTable(const render::LadderReport& ladder) {
 }
 
 std::string SceneSection(const SceneFigures& f) {
-  std::string out = "<h2>" + Escape(f.scene.label) + "</h2>\n" + RowTable(RowsOf(f));
+  std::string out =
+      "<h2>" + Escape(f.scene.label) + "</h2>\n" + RowTable(RowsOf(f), f.scene.label + ": ");
   out += Format("<p>Memory: %.1f MiB BVH, %.1f MiB film, %.2f MiB path state and queues. ",
                 f.bvh_mebibytes, f.film_mebibytes, f.mebibytes);
   out += "The wavefront's stages in the last round:\n" + StageTable(f.schedule);
@@ -131,7 +135,7 @@ std::string Page(const BenchOptions& options, const std::vector<SceneFigures>& s
         "everything runs once, in turn. Only ratios mean much: the machine may be shared.\n",
         scenes.front().threads, scenes.front().isa.c_str(), options.width, options.height,
         options.samples, options.rounds);
-    out += SpeedChart(scenes) + RowTable(SummaryRows(scenes));
+    out += SpeedChart(scenes) + RowTable(SummaryRows(scenes), "");
   }
   for (const std::string& line : skipped) out += "<p class=\"missed\">" + Escape(line) + "\n";
   for (const SceneFigures& f : scenes) out += SceneSection(f);
