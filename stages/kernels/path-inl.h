@@ -47,16 +47,8 @@ HWY_INLINE PathLanes<D> LoadSlots(D d, PathState* paths, const uint32_t* slots, 
 }
 
 template <class D>
-HWY_INLINE Real<D> PathReal(D d, const PathLanes<D>& p, size_t offset) {
-  return FieldReal<PathState>(d, p.paths, p.slot, offset);
-}
-template <class D>
 HWY_INLINE Int<D> PathInt(D d, const PathLanes<D>& p, size_t offset) {
   return FieldInt<PathState>(d, p.paths, p.slot, offset);
-}
-template <class D>
-HWY_INLINE Vec3<D> PathVec3(D d, const PathLanes<D>& p, size_t offset) {
-  return FieldVec3<PathState>(d, p.paths, p.slot, offset);
 }
 
 /// Four neighbouring words, from a multiple of 16 bytes: one load per path and a transposition.
@@ -100,12 +92,6 @@ HWY_INLINE void StoreWord(D d, const LaneList<D>& list, size_t offset, V value) 
   for (size_t i = 0; i < list.count; ++i) {
     std::memcpy(reinterpret_cast<char*>(list.path[i]) + offset, &lanes[list.lane[i]], 4);
   }
-}
-template <class D>
-HWY_INLINE void StoreVec3(D d, const LaneList<D>& list, size_t offset, const Vec3<D>& value) {
-  StoreWord(d, list, offset, value.x);
-  StoreWord(d, list, offset + 4, value.y);
-  StoreWord(d, list, offset + 8, value.z);
 }
 
 /// Writes four neighbouring words, from a multiple of 16 bytes, of each listed path.

@@ -46,10 +46,6 @@ inline Int<D> PathInt(D, const PathLanes<D>& p, size_t offset) {
   return {PathWord<int32_t>(p.paths, offset)};
 }
 template <class D>
-inline Vec3<D> PathVec3(D d, const PathLanes<D>& p, size_t offset) {
-  return {PathReal(d, p, offset), PathReal(d, p, offset + 8), PathReal(d, p, offset + 16)};
-}
-template <class D>
 inline Quad<D> PathQuad(D d, const PathLanes<D>& p, size_t offset) {
   return {PathReal(d, p, offset), PathReal(d, p, offset + 8), PathReal(d, p, offset + 16),
           PathReal(d, p, offset + 24)};
@@ -78,12 +74,6 @@ inline void StoreWord(D, const LaneList<D>& list, size_t offset, hn::Lane<T> val
     bits = static_cast<int64_t>(value.v);
   }
   std::memcpy(reinterpret_cast<char*>(list.path[0]) + offset, &bits, sizeof bits);
-}
-template <class D>
-inline void StoreVec3(D d, const LaneList<D>& list, size_t offset, const Vec3<D>& value) {
-  StoreWord(d, list, offset, value.x);
-  StoreWord(d, list, offset + 8, value.y);
-  StoreWord(d, list, offset + 16, value.z);
 }
 template <class D, class X, class Y, class Z, class W>
 inline void StoreQuad(D d, const LaneList<D>& list, size_t offset, X x, Y y, Z z, W w) {

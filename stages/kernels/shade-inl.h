@@ -233,7 +233,7 @@ HWY_INLINE SurfaceParams<D> MaterialParams(D d, const KernelContext& c, const Ve
   params.ior_zero = MaterialHas(d, v.at.material, kMaterialIorZero);
   params.specular = factor(offsetof(Material, specular)) * specular.a;
   params.specular_color =
-      Mul<D>(FieldVec3(d, v.at.material, offsetof(Material, specular_color)), tint.rgb);
+      Mul<D>(FieldTriple(d, v.at.material, offsetof(Material, specular_color)), tint.rgb);
   return params;
 }
 

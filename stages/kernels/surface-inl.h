@@ -76,7 +76,7 @@ HWY_INLINE Mask<D> IsPresent(D d, Int<D> offset) {
 template <class D>
 HWY_INLINE Vec3<D> NormalToWorld(D d, const Records<Placement, D>& placement, const Vec3<D>& n) {
   const auto row = [&](size_t i) HWY_ATTR {
-    return Dot(FieldVec3(d, placement, offsetof(Placement, normal_to_world) + 12 * i), n);
+    return Dot(FieldTriple(d, placement, offsetof(Placement, normal_to_world) + 12 * i), n);
   };
   return {row(0), row(1), row(2)};
 }
@@ -84,7 +84,7 @@ HWY_INLINE Vec3<D> NormalToWorld(D d, const Records<Placement, D>& placement, co
 template <class D>
 HWY_INLINE Vec3<D> VectorToWorld(D d, const Records<Placement, D>& placement, const Vec3<D>& v) {
   const auto row = [&](size_t i) HWY_ATTR {
-    return Dot(FieldVec3(d, placement, offsetof(Placement, object_to_world) + 16 * i), v);
+    return Dot(FieldTriple(d, placement, offsetof(Placement, object_to_world) + 16 * i), v);
   };
   return {row(0), row(1), row(2)};
 }
@@ -259,7 +259,7 @@ HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const SurfacePoi
 template <class D>
 HWY_INLINE Rgba<D> BaseColor(D d, const KernelContext& c, const SurfacePoint<D>& at,
                              const TextureFootprint<D>& footprint, Mask<D> active) {
-  const Vec3<D> factor = FieldVec3(d, at.material, offsetof(Material, base_color));
+  const Vec3<D> factor = FieldTriple(d, at.material, offsetof(Material, base_color));
   const Real<D> alpha = FieldReal(d, at.material, offsetof(Material, base_color) + 12);
   const Rgba<D> texel = MaterialTexture(d, c, at, footprint, Slot::base_color, active, 1);
   Rgba<D> color = {Mul<D>(factor, texel.rgb), alpha * texel.a};
@@ -305,7 +305,7 @@ HWY_INLINE Vec3<D> EmittedRadiance(D d, const KernelContext& c, const SurfacePoi
                                    const Vec2<D>& uv, Mask<D> active) {
   const TextureFootprint<D> finest = {uv, Splat(d, -100), hn::Zero(d)};
   const Rgba<D> texel = MaterialTexture(d, c, at, finest, Slot::emissive, active, 1);
-  return Mul<D>(FieldVec3(d, at.material, offsetof(Material, emissive)), texel.rgb);
+  return Mul<D>(FieldTriple(d, at.material, offsetof(Material, emissive)), texel.rgb);
 }
 
 template <class D>

@@ -128,6 +128,19 @@ HWY_INLINE Quad<D> FieldQuad(D d, const Record* HWY_RESTRICT base, Int<D> index,
                     index * hn::Set(di, static_cast<int32_t>(sizeof(Record) / 4)));
 }
 
+/// The three floats from byte `offset` of each lane's record; with a neighbour, where that saves
+/// loads.
+template <class Record, class D>
+HWY_INLINE Vec3<D> FieldTriple(D d, const Records<Record, D>& records, size_t offset) {
+  if (hn::MaxLanes(D()) < 4 || records.same != nullptr) return FieldVec3(d, records, offset);
+  if (offset + 16 <= sizeof(Record)) {
+    const Quad<D> q = FieldQuad(d, records.base, records.index, offset);
+    return {q.x, q.y, q.z};
+  }
+  const Quad<D> q = FieldQuad(d, records.base, records.index, offset - 4);
+  return {q.y, q.z, q.w};
+}
+
 /// The four integers from byte `offset` of record `index`.
 template <class Record, class D>
 HWY_INLINE IntQuad<D> FieldIntQuad(D d, const Record* HWY_RESTRICT base, Int<D> index,
