@@ -3,6 +3,7 @@
 #include "stages/film/accumulator.h"
 
 #include <gtest/gtest.h>
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -44,6 +45,36 @@ TEST(Film, SumsDoNotDependOnOrder) {
     EXPECT_EQ(forwards.Sum(0, g, 1), threaded.Sum(0, g, 1));
   }
   EXPECT_EQ(threaded.Samples(0), samples.size());
+}
+
+// Many threads, each with one writer at a time, whose lock goes from tile to tile: every sample of
+// every pixel is there. The widths are odd, so that tiles are cut and share locks.
+TEST(Film, WritersOfManyTilesLoseNothing) {
+  constexpr uint32_t kSamples = 24;
+  for (const uint32_t width : {1u, 37u, 1000u}) {
+    const uint32_t height = 48, pixels = width * height;
+    FilmAccumulator film(width, height, {});
+    std::vector<uint32_t> places(size_t{pixels} * kSamples);
+    std::iota(places.begin(), places.end(), 0u);
+    std::shuffle(places.begin(), places.end(), std::mt19937(width));
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, places.size(), 64), [&](const auto& range) {
+      FilmAccumulator::Writer writer(film);
+      for (size_t i = range.begin(); i < range.end(); ++i) {
+        const uint32_t pixel = places[i] / kSamples, sample = places[i] % kSamples;
+        const float rgb[3] = {1, static_cast<float>(pixel), static_cast<float>(sample)};
+        writer.Add(pixel, sample, rgb);
+      }
+    });
+    constexpr uint32_t kEach = kSamples / kScrambles;
+    for (uint32_t pixel = 0; pixel < pixels; ++pixel) {
+      ASSERT_EQ(film.Samples(pixel), kSamples) << width << ", " << pixel;
+      for (uint32_t g = 0; g < kScrambles; ++g) {
+        ASSERT_EQ(film.Sum(pixel, g, 0), kEach);
+        ASSERT_EQ(film.Sum(pixel, g, 1), static_cast<double>(kEach) * pixel);
+        ASSERT_EQ(film.Sum(pixel, g, 2), kEach * g + kScrambles * (kEach * (kEach - 1) / 2));
+      }
+    }
+  }
 }
 
 TEST(Film, SamplesGoToTheirScramble) {
