@@ -99,13 +99,13 @@ class FilmAccumulator {
     void Add(uint32_t pixel, uint32_t sample, const float radiance[3]);
 
    private:
-    static constexpr uint32_t kNone = ~0u;
+    static constexpr uint32_t kNoLock = ~0u;
     void Release() {
-      if (held_ != kNone) film_.locks_.Unlock(held_);
+      if (held_ != kNoLock) film_.locks_.Unlock(held_);
     }
 
     FilmAccumulator& film_;
-    uint32_t held_ = kNone;
+    uint32_t held_ = kNoLock;
   };
   void Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
     Writer(*this).Add(pixel, sample, radiance);

@@ -21,10 +21,10 @@ class TileLocks {
     return ((y / 16) * 37 + x / 16) % kLocks;
   }
 
-  /// Held for some ten nanoseconds a sample. Yields, should a holder have lost its core.
+  /// Locks are held for a few samples: waits awake, but yields should a holder have lost its core.
   void Lock(uint32_t which) {
     std::atomic<bool>& held = locks_[which].held;
-    for (int tries = 0; held.exchange(true, std::memory_order_acquire); ++tries) {
+    for (int tries = 0; held.exchange(true, std::memory_order_acquire);) {
       while (held.load(std::memory_order_relaxed)) {
         if (++tries > 100) std::this_thread::yield();
       }

@@ -79,15 +79,16 @@ HWY_INLINE Index<D> LookUpWord(D, const int32_t* HWY_RESTRICT table, Index<D> in
   return LookUp(IndexTag<D>(), table, index);
 }
 
-/// table[index] and its successors, which one load per lane brings where lanes are four floats or
-/// more. All of four words must be readable, also of a pair.
 template <class D>
 struct WordPair {
   Index<D> first, second;
 };
+
+/// Lanes are four floats or more, so that one load per lane brings four neighbouring words.
 template <class D>
 constexpr bool kLoadsQuads = sizeof(hn::TFromD<D>) == 4 && hn::MaxLanes(D()) >= 4;
 
+/// table[index] and its successors. All of four words must be readable, also of a pair.
 template <class D>
 HWY_INLINE Quad<D> LookUpQuad(D d, const float* HWY_RESTRICT table, Index<D> index) {
   if constexpr (kLoadsQuads<D>) {

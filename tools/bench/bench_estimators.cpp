@@ -34,8 +34,8 @@ struct Estimator {
 };
 constexpr Estimator kBest = {"light tree and MIS", DirectLight::mis, LightChoice::tree};
 // The simplest one that is right: to hit lights by chance, or where some cannot be hit, to choose
-// any of them.
-constexpr Estimator kByChance = {"lights met by chance", DirectLight::bsdf, LightChoice::tree};
+// any of them. The tree would only cost it time.
+constexpr Estimator kByChance = {"lights met by chance", DirectLight::bsdf, LightChoice::uniform};
 constexpr Estimator kAnyLight = {"any light, light sampling alone", DirectLight::light,
                                  LightChoice::uniform};
 constexpr Estimator kBetween[] = {

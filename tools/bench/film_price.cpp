@@ -3,7 +3,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <atomic>
 #include <chrono>
 #include <vector>
 
