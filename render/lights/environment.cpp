@@ -22,10 +22,10 @@ double SinTheta(int row, int height) {
   return std::sin(std::numbers::pi * (row + 0.5) / height);
 }
 
-/// Exclusive cumulative integer masses in proportion to `weights`; `weights` become probabilities.
-/// Every weight above 0 gets a mass of 1 beforehand, so that rounding never makes a light
-/// impossible to find; the rest is dealt by rounding the cumulative sum, which keeps each within 1
-/// of its due.
+/// Cumulative integer masses in proportion to `weights`: of the entries before each, and of all.
+/// `weights` become probabilities. Every weight above 0 gets a mass of 1 beforehand, so that
+/// rounding never makes a light impossible to find; the rest is dealt by rounding the cumulative
+/// sum, which keeps each within 1 of its due.
 void Apportion(std::span<double> weights, int32_t* cdf) {
   double total = 0;
   int32_t positive = 0;
@@ -43,15 +43,16 @@ void Apportion(std::span<double> weights, int32_t* cdf) {
     if (weights[i] > 0) given = passed + static_cast<int32_t>(std::lround(rest * (sum / total)));
     weights[i] = static_cast<double>(given - cdf[i]) / stages::kEnvironmentMass;
   }
+  cdf[weights.size()] = stages::kEnvironmentMass;
 }
 
 /// Fills the guide of a table; see `stages::GuideBits`.
 void MakeGuide(std::span<const int32_t> cdf, int32_t* guide) {
-  const int32_t count = static_cast<int32_t>(cdf.size());
+  const int32_t count = static_cast<int32_t>(cdf.size()) - 1;
   const int32_t cells = stages::GuideSize(count) - 1, cell = stages::kEnvironmentMass / cells;
   int32_t entry = 0;
   const auto advance = [&](int32_t number) {
-    while (entry + 1 < count && cdf[entry + 1] <= number) ++entry;
+    while (cdf[entry + 1] <= number) ++entry;
     return entry;
   };
   for (int32_t k = 0; k < cells; ++k) guide[k] = advance(k * cell);
@@ -112,11 +113,11 @@ EnvironmentReport BuildEnvironment(stages::Environment& environment, int width, 
   built.width = width;
   built.height = height;
   built.texels.resize(4 * w * h);
-  const auto make = [](std::vector<int32_t>& table, size_t entries) {
+  const auto make = [](stages::HugeVector<int32_t>& table, size_t entries) {
     table.resize(entries + stages::kTablePadding);
   };
-  make(built.row_cdf, h);
-  make(built.column_cdf, w * h);
+  make(built.row_cdf, h + 1);
+  make(built.column_cdf, h * (w + 1));
   make(built.row_guide, stages::GuideSize(height));
   make(built.column_guide, h * stages::GuideSize(width));
 
@@ -126,10 +127,10 @@ EnvironmentReport BuildEnvironment(stages::Environment& environment, int width, 
   };
   EachRow(h, w, [&](size_t y, std::span<double> columns) { rows[y] = weigh(y, columns); });
   Apportion(rows, built.row_cdf.data());
-  MakeGuide(std::span(built.row_cdf).first(h), built.row_guide.data());
+  MakeGuide(std::span(built.row_cdf).first(h + 1), built.row_guide.data());
   EachRow(h, w, [&](size_t y, std::span<double> columns) {
     weigh(y, columns);
-    const std::span<int32_t> cdf(&built.column_cdf[w * y], w);
+    const std::span<int32_t> cdf(&built.column_cdf[(w + 1) * y], w + 1);
     Apportion(columns, cdf.data());
     MakeGuide(cdf, &built.column_guide[y * stages::GuideSize(width)]);
     for (size_t x = 0; x < w; ++x) {

@@ -141,7 +141,7 @@ class Placer {
 
   // Room for `count` more elements in a stream; its offset.
   template <class T>
-  int32_t Extend(std::vector<T>& stream, size_t count) {
+  int32_t Extend(stages::HugeVector<T>& stream, size_t count) {
     const size_t offset = stream.size();
     if (offset + count > kMostElements) {
       throw InputError(where_,

@@ -116,7 +116,7 @@ double NearestOfPoint(const stages::TraceView& trace, const Light& light, double
 
 void WarnOfWallsNearLights(const PreparedScene& scene, const stages::TraceView& trace,
                            const WarningSink& warn) {
-  const std::vector<Light>& lights = scene.tables.lights.lights;
+  const stages::HugeVector<Light>& lights = scene.tables.lights.lights;
   if (!warn || lights.empty()) return;
   const stages::FlushDenormals denormals;
   // The farthest receiver is twice the extent times sqrt(3) away, with coordinates of the extent;

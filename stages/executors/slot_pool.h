@@ -1,6 +1,8 @@
 // Free slots of path state: worker-local stacks over one shared stock.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <mutex>
 #include <span>
@@ -23,19 +25,24 @@ class SlotPool {
 
   uint32_t capacity() const { return capacity_; }
 
-  uint32_t Take(uint32_t worker) {
+  void Take(uint32_t worker, std::span<uint32_t> slots) {
     std::vector<uint32_t>& free = local_[worker].free;
-    if (free.empty()) Refill(free);
-    const uint32_t slot = free.back();
-    free.pop_back();
-    return slot;
+    while (!slots.empty()) {
+      if (free.empty()) Refill(free);
+      const size_t some = std::min(slots.size(), free.size());
+      std::copy_n(free.end() - static_cast<ptrdiff_t>(some), some, slots.begin());
+      free.resize(free.size() - some);
+      slots = slots.subspan(some);
+    }
   }
 
   void Give(uint32_t worker, std::span<const uint32_t> slots) {
     std::vector<uint32_t>& free = local_[worker].free;
-    for (const uint32_t slot : slots) {
+    while (!slots.empty()) {
       if (free.size() == kHoard) Return(free);
-      free.push_back(slot);
+      const size_t some = std::min(slots.size(), kHoard - free.size());
+      free.insert(free.end(), slots.begin(), slots.begin() + static_cast<ptrdiff_t>(some));
+      slots = slots.subspan(some);
     }
   }
 

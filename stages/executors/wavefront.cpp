@@ -15,11 +15,12 @@ namespace {
 
 using Slot = uint32_t;
 constexpr uint32_t kMaxBatch = 65536;
+constexpr size_t kPacketsAtOnce = 8;  // so many packets, and rays, of a batch at a time: what one
+constexpr size_t kRaysAtOnce = 64;  // step leaves of them is in the first-level cache for the next
 
 struct alignas(64) WorkerTally {
   RayCounts rays;
-  std::vector<Slot> slots;  // scratch of one batch
-  std::vector<Next> next;
+  std::vector<Next> next;  // scratch of one batch
 };
 
 uint32_t BlockItems(const ExecutorOptions& options, uint32_t preferred) {
@@ -73,20 +74,33 @@ class Wavefront final : public Executor {
  private:
   void BuildGraph();
   void CameraKernel(const Batch<CameraPacket>& batch, Emitter& out);
+  void StartPaths(std::span<const CameraPacket> packets, uint32_t worker, WorkerTally& tally,
+                  Emitter& out);
   void IntersectKernel(const Batch<Slot>& batch, Emitter& out);
   void ShadeKernel(const Batch<Slot>& batch, Emitter& out);
   void ShadowKernel(const Batch<Slot>& batch, Emitter& out);
   void MissKernel(const Batch<Slot>& batch, Emitter& out);
   void FilmKernel(const Batch<Slot>& batch);
 
-  void EmitHit(Slot slot, Emitter& out) {
+  struct Destination {
+    const StageHandle<Slot>* stage;
+    uint32_t bin;
+    bool operator==(const Destination&) const = default;
+  };
+  Destination AfterTrace(Slot slot) const {
     const PathState& path = paths_[slot];
-    if (path.placement >= 0) {
-      out.emit(shade_, bins_.Of(material_of_placement_[path.placement], path.flags), slot);
-    } else if (has_environment_) {
-      out.emit(miss_, 0, slot);
-    } else {
-      out.emit(film_, 0, slot);
+    if (path.placement >= 0)
+      return {&shade_, bins_.Of(material_of_placement_[path.placement], path.flags)};
+    return {has_environment_ ? &miss_ : &film_, 0};
+  }
+  /// Emits neighbours that go to the same place together: most of them, where rays are coherent.
+  void EmitRuns(std::span<const Slot> slots, Emitter& out) const {
+    for (size_t i = 0; i < slots.size();) {
+      const Destination to = AfterTrace(slots[i]);
+      size_t end = i + 1;
+      while (end < slots.size() && AfterTrace(slots[end]) == to) ++end;
+      out.emit(*to.stage, to.bin, slots.subspan(i, end - i));
+      i = end;
     }
   }
   SourceStatus ClaimPackets(SourceContext& source, Emitter& out);
@@ -175,44 +189,65 @@ SourceStatus Wavefront::ClaimPackets(SourceContext& source, Emitter& out) {
   return more ? SourceStatus::more : SourceStatus::exhausted;
 }
 
+/// The pixels of a packet that are in the image; `visit(lane, pixel)`.
+template <class Visit>
+void EachPixel(const KernelContext& c, const CameraPacket& packet, const Visit& visit) {
+  for (uint32_t i = 0; i < kGroupWidth * kGroupHeight; ++i) {
+    const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
+    if (x < c.width && y < c.height) visit(i, y * c.width + x);
+  }
+}
+
 void Wavefront::CameraKernel(const Batch<CameraPacket>& batch, Emitter& out) {
   const FlushDenormals denormals;
   WorkerTally& tally = tallies_[batch.worker];
-  std::vector<Slot>& slots = tally.slots;
-  slots.clear();
-  for (const CameraPacket& packet : batch.items) {
-    for (uint32_t i = 0; i < 8; ++i) {
-      const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
-      if (x >= c_.width || y >= c_.height) continue;
-      const Slot slot = pool_.Take(batch.worker);
-      paths_[slot].pixel = y * c_.width + x;
-      paths_[slot].sample = packet.sample;
-      slots.push_back(slot);
-    }
+  for (size_t i = 0; i < batch.items.size(); i += kPacketsAtOnce) {
+    StartPaths(batch.items.subspan(i, std::min(kPacketsAtOnce, batch.items.size() - i)),
+               batch.worker, tally, out);
+  }
+}
+
+void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worker,
+                           WorkerTally& tally, Emitter& out) {
+  std::array<Slot, kPacketsAtOnce * 8> taken;
+  size_t count = 0;
+  for (const CameraPacket& packet : packets)
+    EachPixel(c_, packet, [&](uint32_t, uint32_t) { ++count; });
+  const std::span<Slot> slots(taken.data(), count);
+  pool_.Take(worker, slots);
+  size_t next = 0;
+  for (const CameraPacket& packet : packets) {
+    EachPixel(c_, packet, [&](uint32_t, uint32_t pixel) {
+      PathState& path = paths_[slots[next++]];
+      path.pixel = pixel;
+      path.sample = packet.sample;
+    });
   }
   kernels_.camera(c_, paths_.data(), slots);
-  size_t first = 0;
-  for (const CameraPacket& packet : batch.items) {
+  next = 0;
+  for (const CameraPacket& packet : packets) {
     std::array<PathState*, 8> group = {};
-    size_t end = first;
-    for (uint32_t i = 0; i < 8; ++i) {
-      const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
-      if (x < c_.width && y < c_.height) group[i] = &paths_[slots[end++]];
-    }
+    EachPixel(c_, packet, [&](uint32_t i, uint32_t) { group[i] = &paths_[slots[next++]]; });
     IntersectPacket(c_.trace, group.data());
-    for (; first < end; ++first) EmitHit(slots[first], out);
   }
-  tally.rays.camera += slots.size();
+  EmitRuns(slots, out);
+  tally.rays.camera += count;
 }
 
 void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {
   const FlushDenormals denormals;
-  if (options_.simd) {
-    IntersectPaths(c_.trace, paths_.data(), batch.items);
-  } else {
-    for (const Slot slot : batch.items) IntersectPath(c_.trace, paths_[slot]);
+  for (size_t i = 0; i < batch.items.size(); i += kRaysAtOnce) {
+    const auto some = batch.items.subspan(i, std::min(kRaysAtOnce, batch.items.size() - i));
+    if (options_.simd) {
+      IntersectPaths(c_.trace, paths_.data(), some);
+    } else {
+      for (const Slot slot : some) IntersectPath(c_.trace, paths_[slot]);
+    }
+    for (const Slot slot : some) {
+      const Destination to = AfterTrace(slot);
+      out.emit(*to.stage, to.bin, slot);
+    }
   }
-  for (const Slot slot : batch.items) EmitHit(slot, out);
   tallies_[batch.worker].rays.bounce += batch.items.size();
 }
 

@@ -16,10 +16,6 @@ T FetchAdd(T& cell, T value) {
   return std::atomic_ref<T>(cell).fetch_add(value, std::memory_order_relaxed);
 }
 
-int64_t ToFixed(double value) {
-  return std::llrint(value * (1 / kFilmQuantum));
-}
-
 void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
   const uint64_t bits = static_cast<uint64_t>(value);
   const uint64_t old = low;
@@ -103,27 +99,17 @@ void FilmAccumulator::Mend(uint32_t pixel, uint32_t sample, double channels[3]) 
   }
 }
 
-void FilmAccumulator::Writer::Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
-  const uint32_t lock = film_.locks_.Of(pixel);
-  if (lock != held_) {
-    Release();
-    film_.locks_.Lock(lock);
-    held_ = lock;
-  }
-  film_.AddLocked(pixel, sample, radiance);
-}
-
-void FilmAccumulator::AddLocked(uint32_t pixel, uint32_t sample, const float radiance[3]) {
-  const int first = static_cast<int>(sample % kScrambles) * 3;
+/// Adds a sample of any kind.
+void FilmAccumulator::AddOther(uint32_t pixel, uint32_t sample, const float radiance[3]) {
   double channels[3] = {radiance[0], radiance[1], radiance[2]};
-  bool plain = true;
-  for (const double value : channels) plain = plain && value >= 0 && value <= largest_;  // not NaN
-  if (!plain && IsMutant(Mutant::rejected_nan)) return;
-  if (!plain) Mend(pixel, sample, channels);
-  int64_t fixed[3];
-  for (int c = 0; c < 3; ++c) fixed[c] = ToFixed(channels[c]);
+  if (!IsPlain(radiance)) {
+    if (IsMutant(Mutant::rejected_nan)) return;
+    Mend(pixel, sample, channels);
+  }
   FilmPixel& p = pixels_[pixel];
-  for (int c = 0; c < 3; ++c) AddFixed(p.low[first + c], p.high[first + c], fixed[c]);
+  const size_t first = sample % kScrambles * 3;
+  for (size_t c = 0; c < 3; ++c)
+    AddFixed(p.low[first + c], p.high[first + c], ToFixed(channels[c]));
   if (IsMutant(Mutant::float_film)) RoundToFloat(p);
   ++p.samples;
 }

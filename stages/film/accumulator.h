@@ -3,12 +3,14 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <mutex>
 #include <vector>
 
 #include "stages/film/tile_locks.h"
+#include "stages/mutants.h"
 #include "stages/tables/huge_pages.h"
 
 namespace carpool::stages {
@@ -96,7 +98,15 @@ class FilmAccumulator {
 
     /// Adds one sample of `pixel` (y * width + x). What cannot be added as it is, is entered in the
     /// ledger.
-    void Add(uint32_t pixel, uint32_t sample, const float radiance[3]);
+    void Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
+      const uint32_t lock = film_.locks_.Of(pixel);
+      if (lock != held_) {
+        Release();
+        film_.locks_.Lock(lock);
+        held_ = lock;
+      }
+      film_.AddLocked(pixel, sample, radiance);
+    }
 
    private:
     static constexpr uint32_t kNoLock = ~0u;
@@ -138,7 +148,26 @@ class FilmAccumulator {
     uint64_t first = ~uint64_t{0};  // sample, then pixel
   };
 
-  void AddLocked(uint32_t pixel, uint32_t sample, const float radiance[3]);
+  void AddLocked(uint32_t pixel, uint32_t sample, const float radiance[3]) {
+    if (IsMutant(Mutant::float_film) || !IsPlain(radiance))
+      return AddOther(pixel, sample, radiance);
+    FilmPixel& p = pixels_[pixel];
+    const size_t first = sample % kScrambles * 3;
+    for (size_t c = 0; c < 3; ++c) {
+      const auto value = static_cast<uint64_t>(ToFixed(radiance[c]));
+      p.low[first + c] += value;
+      p.high[first + c] = static_cast<int16_t>(p.high[first + c] + (p.low[first + c] < value));
+    }
+    ++p.samples;
+  }
+  /// Can the sample be added as it is, and is nothing of it negative?
+  bool IsPlain(const float radiance[3]) const {
+    bool plain = true;
+    for (int c = 0; c < 3; ++c) plain &= radiance[c] >= 0 && radiance[c] <= largest_;  // not NaN
+    return plain;
+  }
+  static int64_t ToFixed(double value) { return std::llrint(value * (1 / kFilmQuantum)); }
+  void AddOther(uint32_t pixel, uint32_t sample, const float radiance[3]);
   void Enter(SampleFault fault, uint32_t pixel, uint32_t sample);
   void Mend(uint32_t pixel, uint32_t sample, double channels[3]);
 

@@ -68,16 +68,16 @@ HWY_INLINE void CameraLanes(D d, const KernelContext& c, const PathLanes<D>& p) 
     spread = Splat(d, pixel_extent);
   }
 
-  const LaneList<D> list = ListLanes(d, p, p.active);
+  const PathTargets<D> to(d, p, p.active);
   const Real<D> zero = hn::Zero(d);
   const Real<D> one = Splat(d, 1);
-  StoreQuad(d, list, offsetof(PathState, origin), origin.x, origin.y, origin.z, zero);  // tnear
-  StoreQuad(d, list, offsetof(PathState, direction), direction.x, direction.y, direction.z,
+  StoreQuad(d, to, offsetof(PathState, origin), origin.x, origin.y, origin.z, zero);  // tnear
+  StoreQuad(d, to, offsetof(PathState, direction), direction.x, direction.y, direction.z,
             zero);  // pdf
-  StoreQuad(d, list, offsetof(PathState, throughput), one, one, one, width);
-  StoreQuad(d, list, offsetof(PathState, radiance), zero, zero, zero, spread);
-  StoreWord(d, list, offsetof(PathState, flags), zero);
-  StoreWord(d, list, offsetof(PathState, shadow_distance), zero);
+  StoreQuad(d, to, offsetof(PathState, throughput), one, one, one, width);
+  StoreQuad(d, to, offsetof(PathState, radiance), zero, zero, zero, spread);
+  StoreWord(d, to, offsetof(PathState, flags), zero);
+  StoreWord(d, to, offsetof(PathState, shadow_distance), zero);
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

@@ -153,8 +153,7 @@ HWY_INLINE Real<D> EnvironmentPdf(D d, const EnvironmentView& view, const Vec3<D
   return LookUpEnvironment(d, view, dir).pdf;
 }
 
-/// An entry of an exclusive cumulative table, and where within the entry's mass the number fell: in
-/// (0, 1).
+/// An entry of a cumulative table, and where within the entry's mass the number fell: in (0, 1).
 template <class D>
 struct TableEntry {
   Int<D> index;
@@ -173,24 +172,36 @@ struct SelectionTables {
 template <class D>
 HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> which, Real<D> u) {
   const IntTag<D> di;
-  const Int<D> one = hn::Set(di, 1), last = hn::Set(di, tables.count - 1);
+  const Int<D> one = hn::Set(di, 1);
   const Real<D> clamped = hn::Min(hn::Max(u, hn::Zero(d)), Splat(d, kLargestBelowOne));
   const Int<D> cell = hn::ConvertTo(di, clamped * Splat(d, kEnvironmentMass));
-  const Int<D> cdf = which * hn::Set(di, tables.count);
+  const Int<D> cdf = which * hn::Set(di, tables.count + 1);
   const Int<D> guide = which * hn::Set(di, GuideSize(tables.count)) +
                        hn::ShiftRightSame(cell, 24 - GuideBits(tables.count));
 
-  const IntPair<D> bounds = GatherIntPair(d, tables.guide, guide);
-  Int<D> low = bounds.x, high = bounds.y;
-  for (auto open = hn::Lt(low, high); !hn::AllFalse(di, open); open = hn::Lt(low, high)) {
-    const Int<D> middle = hn::ShiftRight<1>(low + high + one);
-    const auto above = hn::Gt(GatherInt(d, tables.cdf, cdf + middle), cell);
-    low = hn::IfThenElse(hn::AndNot(above, open), middle, low);
-    high = hn::IfThenElse(hn::And(above, open), middle - one, high);
+  // One load brings the bounds of three entries. What follows the end of a table is not looked at:
+  // the end itself is above every cell.
+  Int<D> low = GatherInt(d, tables.guide, guide);
+  const IntQuad<D> bounds = GatherIntQuad(d, tables.cdf, cdf + low);
+  const auto first = hn::Gt(bounds.y, cell);
+  const auto second = hn::Or(first, hn::Gt(bounds.z, cell));
+  const auto third = hn::Or(second, hn::Gt(bounds.w, cell));
+  Int<D> begin = hn::IfThenElse(first, bounds.x, hn::IfThenElse(second, bounds.y, bounds.z));
+  Int<D> end = hn::IfThenElse(first, bounds.y, hn::IfThenElse(second, bounds.z, bounds.w));
+  low = low + hn::IfThenZeroElse(first, one) + hn::IfThenZeroElse(second, one);
+  if (!hn::AllTrue(di, third)) {
+    low = low + hn::IfThenZeroElse(third, one);
+    Int<D> high = hn::IfThenElse(third, low, GatherInt(d, tables.guide, guide + one));
+    for (auto open = hn::Lt(low, high); !hn::AllFalse(di, open); open = hn::Lt(low, high)) {
+      const Int<D> middle = hn::ShiftRight<1>(low + high + one);
+      const auto above = hn::Gt(GatherInt(d, tables.cdf, cdf + middle), cell);
+      low = hn::IfThenElse(hn::AndNot(above, open), middle, low);
+      high = hn::IfThenElse(hn::And(above, open), middle - one, high);
+    }
+    const IntPair<D> mass = GatherIntPair(d, tables.cdf, cdf + low);
+    begin = mass.x;
+    end = mass.y;
   }
-  const IntPair<D> mass = GatherIntPair(d, tables.cdf, cdf + low);
-  const Int<D> begin = mass.x;
-  const Int<D> end = hn::IfThenElse(hn::Lt(low, last), mass.y, hn::Set(di, kEnvironmentMass));
   // The middle of u's cell, so that an entry of a single cell is met at its centre.
   const Real<D> offset = hn::ConvertTo(d, cell - begin) + Splat(d, 0.5);
   const Real<D> within = SafeDiv(d, offset, hn::ConvertTo(d, end - begin));

@@ -57,60 +57,84 @@ HWY_INLINE Quad<D> PathQuad(D d, const PathLanes<D>& p, size_t offset) {
   return FieldQuad(d, p.paths, p.slot, offset);
 }
 
-/// The lanes of a mask, as a list to loop over.
+/// Bit k: lane k.
 template <class D>
-struct LaneList {
-  static constexpr size_t kLanes = hn::MaxLanes(D());
-  size_t count = 0;
-  uint8_t lane[kLanes];
-  PathState* path[kLanes];
-};
-
-template <class D>
-HWY_INLINE LaneList<D> ListLanes(D d, const PathLanes<D>& p, Mask<D> mask) {
-  LaneList<D> list;
-  HWY_ALIGN int32_t slots[LaneList<D>::kLanes];
-  hn::Store(p.slot, IntTag<D>(), slots);
-  uint8_t bytes[(LaneList<D>::kLanes + 7) / 8 + 8] = {};
+HWY_INLINE uint64_t LaneBits(D d, Mask<D> mask) {
+  uint8_t bytes[(hn::MaxLanes(D()) + 7) / 8 + 8] = {};
   hn::StoreMaskBits(d, mask, bytes);
   uint64_t bits = 0;
   std::memcpy(&bits, bytes, 8);
-  while (bits != 0) {
-    const int lane = __builtin_ctzll(bits);
-    bits &= bits - 1;
-    list.lane[list.count] = static_cast<uint8_t>(lane);
-    list.path[list.count++] = p.paths + slots[lane];
-  }
-  return list;
+  return bits;
 }
 
-/// Writes word `offset / 4` of each listed path.
+/// Where lanes are written: each lane of the mask to its path, the others to a record that nobody
+/// reads, so that stores need no branches. Stays where it was made.
+template <class D>
+class PathTargets {
+ public:
+  static constexpr size_t kLanes = hn::MaxLanes(D());
+
+  HWY_INLINE PathTargets(D d, const PathLanes<D>& p, Mask<D> mask) {
+    HWY_ALIGN int32_t slots[kLanes];
+    hn::Store(p.slot, IntTag<D>(), slots);
+    for (size_t i = 0; i < kLanes; ++i) path_[i] = p.paths + slots[i];
+    if (hn::AllTrue(d, mask)) return;
+    const uint64_t bits = LaneBits(d, mask);
+    for (size_t i = 0; i < kLanes; ++i) path_[i] = (bits >> i & 1) != 0 ? path_[i] : &unread_;
+  }
+  PathTargets(const PathTargets&) = delete;
+  PathTargets& operator=(const PathTargets&) = delete;
+
+  HWY_INLINE float* Word(size_t lane, size_t offset) const {
+    return reinterpret_cast<float*>(reinterpret_cast<char*>(path_[lane]) + offset);
+  }
+
+ private:
+  PathState* path_[kLanes];
+  PathState unread_;
+};
+
+/// Writes word `offset / 4` of each target.
 template <class D, class V>
-HWY_INLINE void StoreWord(D d, const LaneList<D>& list, size_t offset, V value) {
-  HWY_ALIGN float lanes[LaneList<D>::kLanes];
+HWY_INLINE void StoreWord(D d, const PathTargets<D>& to, size_t offset, V value) {
+  constexpr size_t kLanes = PathTargets<D>::kLanes;
+  HWY_ALIGN float lanes[kLanes];
   hn::Store(hn::BitCast(d, value), d, lanes);
-  for (size_t i = 0; i < list.count; ++i) {
-    std::memcpy(reinterpret_cast<char*>(list.path[i]) + offset, &lanes[list.lane[i]], 4);
+  for (size_t i = 0; i < kLanes; ++i) std::memcpy(to.Word(i, offset), &lanes[i], 4);
+}
+
+/// Writes the vector's blocks of 16 bytes to targets `lane`, `lane` + 4, ...
+template <class D, class DV>
+HWY_INLINE void StoreBlocks(DV dv, hn::Vec<DV> v, const PathTargets<D>& to, size_t lane,
+                            size_t offset) {
+  if constexpr (hn::MaxLanes(DV()) == 4) {
+    hn::StoreU(v, dv, to.Word(lane, offset));
+  } else {
+    const hn::Half<DV> half;
+    StoreBlocks<D>(half, hn::LowerHalf(half, v), to, lane, offset);
+    StoreBlocks<D>(half, hn::UpperHalf(half, v), to, lane + hn::MaxLanes(DV()) / 2, offset);
   }
 }
 
-/// Writes four neighbouring words, from a multiple of 16 bytes, of each listed path.
+/// Writes four neighbouring words, from a multiple of 16 bytes, of each target.
 template <class D, class X, class Y, class Z, class W>
-HWY_INLINE void StoreQuad(D d, const LaneList<D>& list, size_t offset, X x, Y y, Z z, W w) {
-  constexpr size_t kLanes = LaneList<D>::kLanes;
-  static_assert(kLanes == 1 || kLanes >= 4);
-  HWY_ALIGN float words[4 * kLanes];
-  if constexpr (kLanes >= 4) {
-    hn::StoreInterleaved4(hn::BitCast(d, x), hn::BitCast(d, y), hn::BitCast(d, z),
-                          hn::BitCast(d, w), d, words);
+HWY_INLINE void StoreQuad(D d, const PathTargets<D>& to, size_t offset, X x, Y y, Z z, W w) {
+  static_assert(PathTargets<D>::kLanes == 1 || PathTargets<D>::kLanes >= 4);
+  const Real<D> a = hn::BitCast(d, x), b = hn::BitCast(d, y), c = hn::BitCast(d, z),
+                e = hn::BitCast(d, w);
+  if constexpr (PathTargets<D>::kLanes >= 4) {
+    const Real<D> ac_low = hn::InterleaveLower(d, a, c), be_low = hn::InterleaveLower(d, b, e);
+    const Real<D> ac_high = hn::InterleaveUpper(d, a, c), be_high = hn::InterleaveUpper(d, b, e);
+    StoreBlocks<D>(d, hn::InterleaveLower(d, ac_low, be_low), to, 0, offset);
+    StoreBlocks<D>(d, hn::InterleaveUpper(d, ac_low, be_low), to, 1, offset);
+    StoreBlocks<D>(d, hn::InterleaveLower(d, ac_high, be_high), to, 2, offset);
+    StoreBlocks<D>(d, hn::InterleaveUpper(d, ac_high, be_high), to, 3, offset);
   } else {
-    hn::Store(hn::BitCast(d, x), d, words);
-    hn::Store(hn::BitCast(d, y), d, words + 1);
-    hn::Store(hn::BitCast(d, z), d, words + 2);
-    hn::Store(hn::BitCast(d, w), d, words + 3);
-  }
-  for (size_t i = 0; i < list.count; ++i) {
-    std::memcpy(reinterpret_cast<char*>(list.path[i]) + offset, &words[4 * list.lane[i]], 16);
+    float* const words = to.Word(0, offset);
+    words[0] = hn::GetLane(a);
+    words[1] = hn::GetLane(b);
+    words[2] = hn::GetLane(c);
+    words[3] = hn::GetLane(e);
   }
 }
 

@@ -52,35 +52,35 @@ inline Quad<D> PathQuad(D d, const PathLanes<D>& p, size_t offset) {
 }
 
 template <class D>
-struct LaneList {
-  static constexpr size_t kLanes = 1;
-  size_t count = 0;
-  uint8_t lane[1];
-  PathState* path[1];
-};
-template <class D>
-inline LaneList<D> ListLanes(D, const PathLanes<D>& p, Mask<D> mask) {
-  return {mask.v ? size_t{1} : 0, {0}, {p.paths}};
+inline uint64_t LaneBits(D, Mask<D> mask) {
+  return mask.v ? 1 : 0;
 }
+
+/// Where the lane is written: its path, or nowhere.
+template <class D>
+struct PathTargets {
+  PathTargets(D, const PathLanes<D>& p, Mask<D> mask) : path(mask.v ? p.paths : nullptr) {}
+  PathState* path;
+};
 
 /// The 8 bytes at `offset`; integers are extended by their sign.
 template <class D, class T>
-inline void StoreWord(D, const LaneList<D>& list, size_t offset, hn::Lane<T> value) {
-  if (list.count == 0) return;
+inline void StoreWord(D, const PathTargets<D>& to, size_t offset, hn::Lane<T> value) {
+  if (to.path == nullptr) return;
   int64_t bits;
   if constexpr (std::is_floating_point_v<T>) {
     bits = std::bit_cast<int64_t>(value.v);
   } else {
     bits = static_cast<int64_t>(value.v);
   }
-  std::memcpy(reinterpret_cast<char*>(list.path[0]) + offset, &bits, sizeof bits);
+  std::memcpy(reinterpret_cast<char*>(to.path) + offset, &bits, sizeof bits);
 }
 template <class D, class X, class Y, class Z, class W>
-inline void StoreQuad(D d, const LaneList<D>& list, size_t offset, X x, Y y, Z z, W w) {
-  StoreWord(d, list, offset, x);
-  StoreWord(d, list, offset + 8, y);
-  StoreWord(d, list, offset + 16, z);
-  StoreWord(d, list, offset + 24, w);
+inline void StoreQuad(D d, const PathTargets<D>& to, size_t offset, X x, Y y, Z z, W w) {
+  StoreWord(d, to, offset, x);
+  StoreWord(d, to, offset + 8, y);
+  StoreWord(d, to, offset + 16, z);
+  StoreWord(d, to, offset + 24, w);
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

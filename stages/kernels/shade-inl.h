@@ -145,18 +145,46 @@ HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha, Mask<D>
   return hn::And(active, hn::Or(transparent, culled));
 }
 
+/// next[k] = Next{code[k]} for each lane k of the mask.
+template <class D>
+HWY_INLINE void SetNext(D d, Mask<D> lanes, Int<D> code, Next* next) {
+  constexpr size_t kLanes = hn::MaxLanes(D());
+  static_assert(sizeof(Next) == 1);
+  if constexpr (kLanes > 1) {
+    if (hn::AllTrue(d, lanes)) {
+      const hn::Rebind<uint8_t, D> bytes;
+      hn::StoreU(hn::DemoteTo(bytes, code), bytes, reinterpret_cast<uint8_t*>(next));
+      return;
+    }
+  }
+  HWY_ALIGN int32_t codes[kLanes];
+  hn::Store(code, IntTag<D>(), codes);
+  for (uint64_t bits = LaneBits(d, lanes); bits != 0; bits &= bits - 1) {
+    const int lane = __builtin_ctzll(bits);
+    next[lane] = static_cast<Next>(codes[lane]);
+  }
+}
+template <class D>
+HWY_INLINE Int<D> CodeOf(D, Next next) {
+  return hn::Set(IntTag<D>(), static_cast<int32_t>(next));
+}
+template <class D>
+HWY_INLINE void SetNext(D d, Mask<D> lanes, Next value, Next* next) {
+  SetNext(d, lanes, CodeOf(d, value), next);
+}
+
 /// The same ray goes on: what it hits next at the same place, or behind, is for tracing to find.
 /// Past the largest number of layers the path ends.
 template <class D>
 HWY_INLINE void ContinueThrough(D d, const Vertex<D>& v, Mask<D> passes, Next* next) {
   const UintTag<D> du;
+  const IntTag<D> di;
   const Uint<D> flags = v.flags + hn::Set(du, 1u << kPathLayerShift);
-  const LaneList<D> list = ListLanes(d, v.path, passes);
-  StoreWord(d, list, offsetof(PathState, flags), flags);
-  for (size_t i = 0; i < list.count; ++i) {
-    const uint32_t layers = (list.path[i]->flags & kPathLayerMask) >> kPathLayerShift;
-    next[list.lane[i]] = layers < kMaxAlphaLayers ? Next::trace : Next::film;
-  }
+  StoreWord(d, PathTargets<D>(d, v.path, passes), offsetof(PathState, flags), flags);
+  constexpr int32_t kMost = static_cast<int32_t>(kMaxAlphaLayers << kPathLayerShift);
+  const Int<D> layers = hn::BitCast(di, hn::And(flags, hn::Set(du, kPathLayerMask)));
+  const auto goes_on = hn::Lt(layers, hn::Set(di, kMost));
+  SetNext(d, passes, hn::IfThenElse(goes_on, CodeOf(d, Next::trace), CodeOf(d, Next::film)), next);
 }
 
 /// What the AOVs want of the first hit.
@@ -165,15 +193,15 @@ HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v,
                                const Vec3<D>& albedo, const Vec3<D>& normal, Mask<D> active) {
   const Mask<D> first = hn::And(active, hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(UintTag<D>()))));
   if (hn::AllFalse(d, first)) return;
-  const LaneList<D> list = ListLanes(d, v.path, first);
-  constexpr size_t kLanes = LaneList<D>::kLanes;
-  HWY_ALIGN float words[7][kLanes];
+  HWY_ALIGN float words[7][hn::MaxLanes(D())];
   const Real<D> values[7] = {albedo.x, albedo.y, albedo.z,  normal.x,
                              normal.y, normal.z, v.distance};
   for (int i = 0; i < 7; ++i) hn::Store(values[i], d, words[i]);
-  for (size_t i = 0; i < list.count; ++i) {
-    const size_t lane = list.lane[i];
-    const PathState& path = *list.path[i];
+  HWY_ALIGN int32_t slots[hn::MaxLanes(D())];
+  hn::Store(v.path.slot, IntTag<D>(), slots);
+  for (uint64_t bits = LaneBits(d, first); bits != 0; bits &= bits - 1) {
+    const int lane = __builtin_ctzll(bits);
+    const PathState& path = v.path.paths[slots[lane]];
     const Placement& placement = c.geometry.placements[path.placement];
     FirstHit hit;
     for (int k = 0; k < 3; ++k) hit.albedo[k] = words[k][lane];
@@ -362,12 +390,13 @@ HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s,
                             const ShadowRay<D>& shadow, const Bounce<D>& bounce, Mask<D> lanes,
                             Next* next) {
   const UintTag<D> du;
+  const IntTag<D> di;
   const Real<D> zero = hn::Zero(d);
-  const LaneList<D> list = ListLanes(d, v.path, lanes);
+  const PathTargets<D> to(d, v.path, lanes);
   if (hn::AllFalse(d, hn::Or(shadow.wanted, bounce.alive))) {
-    StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
+    SetNext(d, lanes, Next::film, next);
+    StoreQuad(d, to, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
               v.cone_spread);
-    for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
     return;
   }
   // Beyond a rough bounce the cone widens by roughly the lobe's width, whose solid angle is about 1
@@ -378,32 +407,31 @@ HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s,
       hn::Or(v.depth + hn::Set(du, 1),
              hn::IfThenElseZero(hn::RebindMask(du, bounce.alive), hn::Set(du, kPathAlive)));
   const Real<D> shadow_distance = hn::IfThenElseZero(shadow.wanted, shadow.distance);
-  StoreQuad(d, list, offsetof(PathState, origin), s.origin.x, s.origin.y, s.origin.z, zero);
-  StoreQuad(d, list, offsetof(PathState, direction), bounce.direction.x, bounce.direction.y,
+  StoreQuad(d, to, offsetof(PathState, origin), s.origin.x, s.origin.y, s.origin.z, zero);
+  StoreQuad(d, to, offsetof(PathState, direction), bounce.direction.x, bounce.direction.y,
             bounce.direction.z, bounce.pdf);
-  StoreQuad(d, list, offsetof(PathState, throughput), bounce.throughput.x, bounce.throughput.y,
+  StoreQuad(d, to, offsetof(PathState, throughput), bounce.throughput.x, bounce.throughput.y,
             bounce.throughput.z, v.cone_width);
-  StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
+  StoreQuad(d, to, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
             v.cone_spread + lobe);
-  StoreWord(d, list, offsetof(PathState, flags), flags);
-  StoreQuad(d, list, offsetof(PathState, shadow_direction), shadow.direction.x, shadow.direction.y,
+  StoreWord(d, to, offsetof(PathState, flags), flags);
+  StoreQuad(d, to, offsetof(PathState, shadow_direction), shadow.direction.x, shadow.direction.y,
             shadow.direction.z, shadow_distance);
-  StoreQuad(d, list, offsetof(PathState, shadow_radiance), shadow.radiance.x, shadow.radiance.y,
+  StoreQuad(d, to, offsetof(PathState, shadow_radiance), shadow.radiance.x, shadow.radiance.y,
             shadow.radiance.z, s.packed_normal);
-  for (size_t i = 0; i < list.count; ++i) {
-    const PathState& path = *list.path[i];
-    const bool alive = (path.flags & kPathAlive) != 0;
-    next[list.lane[i]] = path.shadow_distance > 0 ? Next::shadow : alive ? Next::trace : Next::film;
-  }
+  const Int<D> unshadowed = hn::IfThenElse(hn::RebindMask(di, bounce.alive), CodeOf(d, Next::trace),
+                                           CodeOf(d, Next::film));
+  SetNext(d, lanes,
+          hn::IfThenElse(hn::RebindMask(di, shadow.wanted), CodeOf(d, Next::shadow), unshadowed),
+          next);
 }
 
 /// Ends paths that gather nothing more.
 template <class D>
 HWY_INLINE void EndPaths(D d, const Vertex<D>& v, Mask<D> lanes, Next* next) {
-  const LaneList<D> list = ListLanes(d, v.path, lanes);
-  StoreQuad(d, list, offsetof(PathState, radiance), v.radiance.x, v.radiance.y, v.radiance.z,
-            v.cone_spread);
-  for (size_t i = 0; i < list.count; ++i) next[list.lane[i]] = Next::film;
+  StoreQuad(d, PathTargets<D>(d, v.path, lanes), offsetof(PathState, radiance), v.radiance.x,
+            v.radiance.y, v.radiance.z, v.cone_spread);
+  SetNext(d, lanes, Next::film, next);
 }
 
 /// One vector of paths on its way through the steps of shading.
@@ -551,7 +579,7 @@ HWY_INLINE void MissLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
   const Vec3<D> throughput = {through.x, through.y, through.z};
   const Vec3<D> before = {gathered.x, gathered.y, gathered.z};
   const Vec3<D> sum = Add<D>(before, Scale(Mul<D>(throughput, environment.radiance), weight));
-  StoreQuad(d, ListLanes(d, p, p.active), offsetof(PathState, radiance), sum.x, sum.y, sum.z,
+  StoreQuad(d, PathTargets<D>(d, p, p.active), offsetof(PathState, radiance), sum.x, sum.y, sum.z,
             gathered.w);
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "stages/tables/huge_pages.h"
+
 namespace carpool::stages {
 
 constexpr int32_t kNone = -1;  // an absent stream, texture, light or material
@@ -66,8 +68,8 @@ struct Mesh {
 };
 
 struct GeometryTables {
-  std::vector<float> floats;      // all vertex streams, at most 2^31 - 1 elements
-  std::vector<uint32_t> indices;  // vertex numbers within the shape, at most 2^31 - 1 elements
+  HugeVector<float> floats;      // all vertex streams, at most 2^31 - 1 elements
+  HugeVector<uint32_t> indices;  // vertex numbers within the shape, at most 2^31 - 1 elements
   std::vector<Shape> shapes;
   std::vector<Mesh> meshes;
   std::vector<MeshInstance> instances;

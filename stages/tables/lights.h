@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "stages/tables/huge_pages.h"
+
 namespace carpool::stages {
 
 enum class LightType : int32_t {
@@ -55,10 +57,9 @@ constexpr int32_t kTablePadding = 3;  // words behind each table below: kernels 
 /// Inverting a table starts from its guide (Chen & Asau 1974, "On Generating Random Variates from
 /// an Empirical Distribution"): numbers are divided into 2^bits equal cells, and entry k of the
 /// guide is where a search for the first number of cell k ends; one more entry is for the last
-/// number of all.
+/// number of all. With about as many cells as entries most searches end where they begin.
 constexpr int32_t GuideBits(int32_t count) {
-  const int32_t width = std::bit_width(static_cast<uint32_t>(count));
-  return width > 3 ? width - 3 : 0;
+  return std::bit_width(static_cast<uint32_t>(count)) - 1;
 }
 constexpr int32_t GuideSize(int32_t count) {
   return (1 << GuideBits(count)) + 1;
@@ -72,17 +73,17 @@ struct Environment {
   int32_t height = 0;
   /// 4 floats a texel: RGB in cd/m2, finite and >= 0, then P(row) P(column | row), the probability
   /// that sampling selects this texel: > 0 wherever RGB is. At most 2^29 texels.
-  std::vector<float> texels;
+  HugeVector<float> texels;
   /// Behind each of these are kTablePadding words more.
-  std::vector<int32_t> row_cdf;       // height entries: exclusive cumulative mass of rows
-  std::vector<int32_t> column_cdf;    // width * height: exclusive cumulative mass within each row
-  std::vector<int32_t> row_guide;     // GuideSize(height) entries
-  std::vector<int32_t> column_guide;  // height * GuideSize(width)
+  HugeVector<int32_t> row_cdf;       // height + 1: mass of the rows before each, and of all
+  HugeVector<int32_t> column_cdf;    // height * (width + 1): the same within each row
+  HugeVector<int32_t> row_guide;     // GuideSize(height)
+  HugeVector<int32_t> column_guide;  // height * GuideSize(width)
 };
 
 struct LightTables {
-  std::vector<Light> lights;     // triangle lights first, in placement order; then punctual ones
-  std::vector<LightNode> nodes;  // depth-first; empty: no light in the tree
+  HugeVector<Light> lights;     // triangle lights first, in placement order; then punctual ones
+  HugeVector<LightNode> nodes;  // depth-first; empty: no light in the tree
   std::vector<int32_t> infinite_lights;  // indices of directional lights
   Environment environment;
   float tree_probability = 0;         // of choosing the tree, each infinite light, the environment:

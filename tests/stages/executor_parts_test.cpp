@@ -6,6 +6,9 @@
 #include <map>
 #include <mutex>
 #include <set>
+#include <span>
+#include <tuple>
+#include <vector>
 
 #include "stages/executors/binning.h"
 #include "stages/executors/camera_work.h"
@@ -61,9 +64,13 @@ TEST(SlotPool, NeverHandsOutASlotTwiceAndNeverRunsDry) {
         std::vector<uint32_t> mine;
         for (int round = 0; round < 200; ++round) {
           while (mine.size() < kInFlight / kWorkers) {
-            mine.push_back(pool.Take(worker));
-            ASSERT_LT(mine.back(), pool.capacity());
-            EXPECT_EQ(taken[mine.back()].fetch_add(1), 0);
+            const size_t first = mine.size(), room = kInFlight / kWorkers - first;
+            mine.resize(first + std::min<size_t>(room, static_cast<size_t>(round) * 7 + 1));
+            pool.Take(worker, std::span(mine).subspan(first));
+            for (size_t i = first; i < mine.size(); ++i) {
+              ASSERT_LT(mine[i], pool.capacity());
+              EXPECT_EQ(taken[mine[i]].fetch_add(1), 0);
+            }
           }
           const size_t keep = static_cast<size_t>(round * 37) % mine.size();
           const std::vector<uint32_t> back(mine.begin() + static_cast<ptrdiff_t>(keep), mine.end());

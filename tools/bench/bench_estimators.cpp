@@ -70,7 +70,7 @@ Result RenderFor(const RenderSettings& settings, double seconds) {
     const auto has_size = [](const stages::Light& light) {
       return static_cast<int32_t>(light.type) <= stages::kLastTriangleType;
     };
-    const std::vector<stages::Light>& lights = w.scene().tables.lights.lights;
+    const auto& lights = w.scene().tables.lights.lights;
     result.lights_have_size = std::all_of(lights.begin(), lights.end(), has_size);
   });
   return result;

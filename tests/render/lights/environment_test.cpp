@@ -16,9 +16,11 @@ namespace {
 using stages::Environment;
 using stages::kEnvironmentMass;
 
-int32_t Mass(const std::vector<int32_t>& cdf, size_t begin, size_t count, size_t i) {
-  const int32_t next = i + 1 < count ? cdf[begin + i + 1] : kEnvironmentMass;
-  return next - cdf[begin + i];
+/// Of entry `i` of table `which`, of tables with `count` entries each.
+int32_t Mass(const stages::HugeVector<int32_t>& cdf, size_t which, size_t count, size_t i) {
+  const int32_t* const table = &cdf[which * (count + 1)];
+  EXPECT_EQ(table[count], kEnvironmentMass);
+  return table[i + 1] - table[i];
 }
 
 /// A map with some black, one black row and a sun.
@@ -53,7 +55,7 @@ TEST(EnvironmentTables, MassesAreInProportionAndNoneIsLost) {
     for (size_t x = 0; x < kWidth; ++x) row_weight += weight(x, y);
     EXPECT_NEAR(row, row_weight / total, 2.0 * kHeight / kEnvironmentMass);
     for (size_t x = 0; x < kWidth; ++x) {
-      const int32_t mass = Mass(e.column_cdf, y * kWidth, kWidth, x);
+      const int32_t mass = Mass(e.column_cdf, y, kWidth, x);
       const float p = e.texels[4 * (y * kWidth + x) + 3];
       EXPECT_EQ(p > 0, weight(x, y) > 0);
       if (row_weight == 0) continue;  // a row that is never selected
@@ -71,7 +73,7 @@ TEST(EnvironmentTables, UniformMapsHaveEqualMassesAlongARow) {
   BuildEnvironment(e, 64, 32, std::vector<float>(3 * 64 * 32, 0.7f));
   for (size_t y = 0; y < 32; ++y) {
     for (size_t x = 0; x < 64; ++x) {
-      ASSERT_EQ(Mass(e.column_cdf, y * 64, 64, x), kEnvironmentMass / 64);
+      ASSERT_EQ(Mass(e.column_cdf, y, 64, x), kEnvironmentMass / 64);
     }
   }
 }
