@@ -67,6 +67,24 @@ HWY_INLINE uint64_t LaneBits(D d, Mask<D> mask) {
   return bits;
 }
 
+/// bytes[k] = the lowest byte of lane k, 0..255, for each lane k of the mask.
+template <class D>
+HWY_INLINE void StoreBytes(D d, Mask<D> mask, Int<D> values, uint8_t* bytes) {
+  constexpr size_t kLanes = hn::MaxLanes(D());
+  if constexpr (kLanes > 1) {
+    if (hn::AllTrue(d, mask)) {
+      const hn::Rebind<uint8_t, D> db;
+      return hn::StoreU(hn::DemoteTo(db, values), db, bytes);
+    }
+  }
+  HWY_ALIGN int32_t words[kLanes];
+  hn::Store(values, IntTag<D>(), words);
+  for (uint64_t bits = LaneBits(d, mask); bits != 0; bits &= bits - 1) {
+    const int lane = __builtin_ctzll(bits);
+    bytes[lane] = static_cast<uint8_t>(words[lane]);
+  }
+}
+
 /// Where lanes are written: each lane of the mask to its path, the others to a record that nobody
 /// reads, so that stores need no branches. Stays where it was made.
 template <class D>

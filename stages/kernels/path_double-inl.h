@@ -56,6 +56,11 @@ inline uint64_t LaneBits(D, Mask<D> mask) {
   return mask.v ? 1 : 0;
 }
 
+template <class D>
+inline void StoreBytes(D, Mask<D> mask, Int<D> value, uint8_t* bytes) {
+  if (mask.v) bytes[0] = static_cast<uint8_t>(value.v);
+}
+
 /// Where the lane is written: its path, or nowhere.
 template <class D>
 struct PathTargets {

@@ -148,21 +148,8 @@ HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha, Mask<D>
 /// next[k] = Next{code[k]} for each lane k of the mask.
 template <class D>
 HWY_INLINE void SetNext(D d, Mask<D> lanes, Int<D> code, Next* next) {
-  constexpr size_t kLanes = hn::MaxLanes(D());
   static_assert(sizeof(Next) == 1);
-  if constexpr (kLanes > 1) {
-    if (hn::AllTrue(d, lanes)) {
-      const hn::Rebind<uint8_t, D> bytes;
-      hn::StoreU(hn::DemoteTo(bytes, code), bytes, reinterpret_cast<uint8_t*>(next));
-      return;
-    }
-  }
-  HWY_ALIGN int32_t codes[kLanes];
-  hn::Store(code, IntTag<D>(), codes);
-  for (uint64_t bits = LaneBits(d, lanes); bits != 0; bits &= bits - 1) {
-    const int lane = __builtin_ctzll(bits);
-    next[lane] = static_cast<Next>(codes[lane]);
-  }
+  StoreBytes(d, lanes, code, reinterpret_cast<uint8_t*>(next));
 }
 template <class D>
 HWY_INLINE Int<D> CodeOf(D, Next next) {
