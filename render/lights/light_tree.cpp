@@ -214,6 +214,7 @@ class TreeBuilder {
     n.radius = static_cast<float>(c.radius > 0 ? c.radius * (1 + 1e-6) + largest * 2e-7 : 0);
     n.signed_power = static_cast<float>(c.two_sided ? -c.power : c.power);
     n.cos_theta_o = static_cast<float>(std::cos(c.theta_o));
+    n.sin_theta_o = std::sqrt(std::max(std::fma(-n.cos_theta_o, n.cos_theta_o, 1.0f), 0.0f));
     n.cos_theta_e = static_cast<float>(std::cos(std::min(c.theta_e, kPi)));
     n.child_or_light = child_or_light;
     n.parent = parent;

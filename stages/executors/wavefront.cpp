@@ -285,11 +285,16 @@ void Wavefront::MissKernel(const Batch<Slot>& batch, Emitter& out) {
 
 void Wavefront::FilmKernel(const Batch<Slot>& batch) {
   const FlushDenormals denormals;
-  constexpr size_t kAhead = 8;
+  constexpr size_t kAhead = 12;
   FilmAccumulator::Writer film(*c_.film);
-  for (size_t i = 0; i < batch.items.size(); ++i) {
-    if (i + kAhead < batch.items.size()) c_.film->Prefetch(paths_[batch.items[i + kAhead]].pixel);
-    const PathState& path = paths_[batch.items[i]];
+  const std::span<const Slot> slots = batch.items;
+  for (size_t i = 0; i < slots.size(); ++i) {
+    if (i + 2 * kAhead < slots.size()) PrefetchPath(&paths_[slots[i + 2 * kAhead]]);
+    if (i + kAhead < slots.size()) {
+      const PathState& ahead = paths_[slots[i + kAhead]];
+      c_.film->Prefetch(ahead.pixel, ahead.sample);
+    }
+    const PathState& path = paths_[slots[i]];
     film.Add(path.pixel, path.sample, path.radiance);
   }
   pool_.Give(batch.worker, batch.items);

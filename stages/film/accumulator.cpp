@@ -16,20 +16,13 @@ T FetchAdd(T& cell, T value) {
   return std::atomic_ref<T>(cell).fetch_add(value, std::memory_order_relaxed);
 }
 
-void AddFixed(uint64_t& low, int16_t& high, int64_t value) {
-  const uint64_t bits = static_cast<uint64_t>(value);
-  const uint64_t old = low;
-  low = old + bits;
-  high = static_cast<int16_t>(high + (low < old ? 1 : 0) + (value < 0 ? -1 : 0));
-}
-
 /// What a film of floats would keep.
-void RoundToFloat(FilmPixel& pixel) {
-  for (int i = 0; i < kScrambles * 3; ++i) {
-    const __int128 sum = (static_cast<__int128>(pixel.high[i]) << 64) + pixel.low[i];
-    const auto rounded = static_cast<__int128>(static_cast<float>(sum));
-    pixel.low[i] = static_cast<uint64_t>(rounded);
-    pixel.high[i] = static_cast<int16_t>(rounded >> 64);
+void RoundToFloat(FilmSum& sum) {
+  for (size_t c = 0; c < 3; ++c) {
+    const __int128 exact = sum.Quanta(c);
+    const auto rounded = static_cast<__int128>(static_cast<float>(exact));
+    sum.low[c] = static_cast<uint64_t>(rounded);
+    sum.rest += static_cast<uint64_t>((rounded >> 64) - (exact >> 64)) << (FilmSum::kRestBits * c);
   }
 }
 
@@ -106,12 +99,10 @@ void FilmAccumulator::AddOther(uint32_t pixel, uint32_t sample, const float radi
     if (IsMutant(Mutant::rejected_nan)) return;
     Mend(pixel, sample, channels);
   }
-  FilmPixel& p = pixels_[pixel];
-  const size_t first = sample % kScrambles * 3;
-  for (size_t c = 0; c < 3; ++c)
-    AddFixed(p.low[first + c], p.high[first + c], ToFixed(channels[c]));
-  if (IsMutant(Mutant::float_film)) RoundToFloat(p);
-  ++p.samples;
+  FilmSum& sum = pixels_[pixel][sample % kScrambles];
+  for (size_t c = 0; c < 3; ++c) sum.Add(c, ToFixed(channels[c]));
+  sum.Count();
+  if (IsMutant(Mutant::float_film)) RoundToFloat(sum);
 }
 
 SampleLedger FilmAccumulator::Ledger() const {
@@ -148,10 +139,8 @@ void FilmAccumulator::AddFirstHit(uint32_t pixel, uint32_t sample, const FirstHi
 }
 
 double FilmAccumulator::Sum(uint32_t pixel, int scramble, int channel) const {
-  const FilmPixel& p = pixels_[pixel];
-  const int i = scramble * 3 + channel;
-  const __int128 sum = (static_cast<__int128>(p.high[i]) << 64) + p.low[i];
-  return static_cast<double>(sum) * kFilmQuantum;
+  const FilmSum& sum = pixels_[pixel][static_cast<size_t>(scramble)];
+  return static_cast<double>(sum.Quanta(static_cast<size_t>(channel))) * kFilmQuantum;
 }
 
 namespace {

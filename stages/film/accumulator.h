@@ -19,13 +19,44 @@ constexpr int kScrambles = 4;             // samples belong by index to four ind
 constexpr double kFilmQuantum = 0x1p-32;  // cd/m2 (or the file's unit) of the lowest bit
 constexpr double kFilmLargest = 0x1p30;   // larger channels are clamped and counted: 2^62 quanta
 
-/// Per pixel and scramble, RGB sums in 80-bit fixed point: range +-2^47 at quantum 2^-32, hence no
-/// overflow while samples per scramble x mean < 2^47. 128 bytes.
-struct alignas(64) FilmPixel {
-  uint64_t low[kScrambles * 3];
-  int16_t high[kScrambles * 3];
-  uint32_t samples;
+/// The samples of one pixel and scramble: their number and RGB sums in 79-bit fixed point: range
+/// +-2^46 at quantum 2^-32, hence no overflow while samples x mean < 2^46. Half a cache line.
+struct alignas(32) FilmSum {
+  uint64_t low[3];  // the sums modulo 2^64
+  uint64_t rest;    // R + 2^15 G + 2^30 B + 2^45 samples, where R, G, B are what `low` leaves out
+
+  static constexpr int kRestBits = 15;
+
+  /// Adds quanta to one channel.
+  void Add(size_t channel, int64_t quanta) {
+    const uint64_t old = low[channel];
+    low[channel] = old + static_cast<uint64_t>(quanta);
+    const int64_t carry = (low[channel] < old ? 1 : 0) - (quanta < 0 ? 1 : 0);
+    rest += static_cast<uint64_t>(carry) << (kRestBits * channel);
+  }
+  void Count() { rest += uint64_t{1} << (3 * kRestBits); }
+
+  uint32_t Samples() const { return static_cast<uint32_t>(Digit(3)); }
+  __int128 Quanta(size_t channel) const {
+    return (static_cast<__int128>(Digit(channel)) << 64) + low[channel];
+  }
+
+ private:
+  /// Part 0 to 2 of `rest`, or the number of samples. Parts are signed: what is below must go
+  /// first.
+  int64_t Digit(size_t part) const {
+    uint64_t above = rest;
+    int64_t digit = 0;
+    for (size_t i = 0; i <= part; ++i) {
+      constexpr int kUnused = 64 - kRestBits;
+      digit =
+          i == 3 ? static_cast<int64_t>(above) : static_cast<int64_t>(above << kUnused) >> kUnused;
+      above = (above - static_cast<uint64_t>(digit)) >> kRestBits;
+    }
+    return digit;
+  }
 };
+using FilmPixel = std::array<FilmSum, kScrambles>;
 static_assert(sizeof(FilmPixel) == 128);
 
 /// Why a sample went into the ledger. Each sample is entered once, under the first that holds.
@@ -120,16 +151,19 @@ class FilmAccumulator {
   void Add(uint32_t pixel, uint32_t sample, const float radiance[3]) {
     Writer(*this).Add(pixel, sample, radiance);
   }
-  /// Asks for the pixel's cache lines ahead of Add.
-  void Prefetch(uint32_t pixel) const {
-    __builtin_prefetch(&pixels_[pixel], 1);
-    __builtin_prefetch(&pixels_[pixel].high, 1);
+  /// Asks for the cache line that Add will need.
+  void Prefetch(uint32_t pixel, uint32_t sample) const {
+    __builtin_prefetch(&pixels_[pixel][sample % kScrambles], 1);
   }
 
   /// Adds what sample `sample` of `pixel` saw first; ids and depth are kept of sample 0 alone.
   void AddFirstHit(uint32_t pixel, uint32_t sample, const FirstHit& hit);
 
-  uint32_t Samples(uint32_t pixel) const { return pixels_[pixel].samples; }
+  uint32_t Samples(uint32_t pixel) const {
+    uint32_t samples = 0;
+    for (const FilmSum& sum : pixels_[pixel]) samples += sum.Samples();
+    return samples;
+  }
   /// What was entered so far; sums over the film, so not cheap.
   SampleLedger Ledger() const;
   /// Sum of one channel over the samples of one scramble.
@@ -151,14 +185,9 @@ class FilmAccumulator {
   void AddLocked(uint32_t pixel, uint32_t sample, const float radiance[3]) {
     if (IsMutant(Mutant::float_film) || !IsPlain(radiance))
       return AddOther(pixel, sample, radiance);
-    FilmPixel& p = pixels_[pixel];
-    const size_t first = sample % kScrambles * 3;
-    for (size_t c = 0; c < 3; ++c) {
-      const auto value = static_cast<uint64_t>(ToFixed(radiance[c]));
-      p.low[first + c] += value;
-      p.high[first + c] = static_cast<int16_t>(p.high[first + c] + (p.low[first + c] < value));
-    }
-    ++p.samples;
+    FilmSum& sum = pixels_[pixel][sample % kScrambles];
+    for (size_t c = 0; c < 3; ++c) sum.Add(c, ToFixed(radiance[c]));
+    sum.Count();
   }
   /// Can the sample be added as it is, and is nothing of it negative?
   bool IsPlain(const float radiance[3]) const {

@@ -42,6 +42,7 @@ template <class D>
 void Miss(const KernelContext& c, PathState* paths, std::span<const uint32_t> slots) {
   const D d;
   for (size_t i = 0; i < slots.size(); i += hn::Lanes(d)) {
+    PrefetchSlots(paths, slots, i + hn::Lanes(d), hn::Lanes(d));
     MissLanes(d, c, LoadSlots(d, paths, slots.data() + i, slots.size() - i));
   }
   Check("environment", paths, slots);

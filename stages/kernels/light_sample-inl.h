@@ -155,15 +155,36 @@ HWY_INLINE LightSample<D> FromEnvironment(D d, const LightView& view, const Vec2
   return sample;
 }
 
-/// The light each lane shall sample, from the tree or from the infinite ones.
+/// Which light each lane shall sample, while it is being chosen.
 template <class D>
-HWY_INLINE LightPick<D> PickFiniteOrInfinite(D d, const LightView& view, const KindChoice<D>& kind,
-                                             const Vec3<D>& position, const Vec3<D>& normal) {
-  LightPick<D> pick = {hn::Set(IntTag<D>(), kNone), hn::Zero(d), kind.u_remapped};
-  if (!hn::AllFalse(d, kind.tree)) {
-    pick = PickLight(d, view, kind.tree, position, normal, kind.u_remapped);
-    pick.probability = pick.probability * Splat(d, view.tree_probability);
-  }
+struct LightChoice {
+  KindChoice<D> kind;
+  Descent<D> descent;  // of the lanes whose kind is the tree
+};
+
+/// Begins to choose; `normal` is unit length on the side that takes light, or zero for a receiver
+/// that takes it from all sides. `IsChosen` says when it is done, `ChooseOn` goes on.
+template <class D>
+HWY_INLINE LightChoice<D> BeginChoice(D d, const LightView& view, Mask<D> active,
+                                      const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
+  const KindChoice<D> kind = ChooseKind(d, view, active, u);
+  return {kind, StartDescent(d, view, kind.tree, position, normal, kind.u_remapped)};
+}
+template <class D>
+HWY_INLINE bool IsChosen(D d, const LightChoice<D>& choice) {
+  return hn::AllFalse(d, choice.descent.active);
+}
+template <class D>
+HWY_INLINE void ChooseOn(D d, const LightView& view, LightChoice<D>& choice) {
+  Descend(d, view, choice.descent);
+}
+
+/// What was chosen, from the tree or from the infinite lights.
+template <class D>
+HWY_INLINE LightPick<D> PickOf(D d, const LightView& view, const LightChoice<D>& choice) {
+  const KindChoice<D>& kind = choice.kind;
+  LightPick<D> pick = choice.descent.pick;
+  pick.probability = pick.probability * Splat(d, view.tree_probability);
   if (!hn::AllFalse(d, kind.infinite)) {
     const IntTag<D> di;
     const Int<D> which =
@@ -178,24 +199,21 @@ HWY_INLINE LightPick<D> PickFiniteOrInfinite(D d, const LightView& view, const K
   return pick;
 }
 
-/// One sample of all light that may reach each active receiver. `normal` is unit length on the side
-/// that takes light, or zero for a receiver that takes it from all sides.
+/// One sample of the light that was chosen for each active receiver.
 template <class D>
-HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active,
-                                      const Vec3<D>& position, const Vec3<D>& normal,
-                                      Real<D> u_pick, const Vec2<D>& u) {
+HWY_INLINE LightSample<D> SampleChosen(D d, const LightView& view, Mask<D> active,
+                                       const LightChoice<D>& choice, const Vec3<D>& position,
+                                       const Vec2<D>& u) {
   LightSample<D> sample = NoLight(d);
-  const bool any = view.tree_probability > 0 || view.environment_probability > 0 ||
-                   (view.infinite_count > 0 && view.infinite_probability > 0);
-  if (!any) return sample;
-  const KindChoice<D> kind = ChooseKind(d, view, active, u_pick);
-  if (!hn::AllFalse(d, kind.environment)) {
-    sample = Merge(d, kind.environment, sample, FromEnvironment(d, view, u));
+  if (!HasLights(view)) return sample;
+  const Mask<D> environment = choice.kind.environment;
+  if (!hn::AllFalse(d, environment)) {
+    sample = Merge(d, environment, sample, FromEnvironment(d, view, u));
   }
-  const LightPick<D> pick = PickFiniteOrInfinite(d, view, kind, position, normal);
+  const LightPick<D> pick = PickOf(d, view, choice);
   const IntTag<D> di;
   const auto picked = hn::Gt(pick.light, hn::Set(di, kNone));
-  const Mask<D> has_light = hn::AndNot(kind.environment, hn::And(active, ToMask(d, picked)));
+  const Mask<D> has_light = hn::AndNot(environment, hn::And(active, ToMask(d, picked)));
   if (hn::AllFalse(d, has_light)) return sample;
 
   const Int<D> light = hn::IfThenElseZero(ToIntMask(d, has_light), pick.light);
@@ -210,6 +228,16 @@ HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active
   }
   sample.pdf = hn::IfThenElse(has_light, sample.pdf * pick.probability, sample.pdf);
   return sample;
+}
+
+/// All at once: one sample of all light that may reach each active receiver.
+template <class D>
+HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active,
+                                      const Vec3<D>& position, const Vec3<D>& normal,
+                                      Real<D> u_pick, const Vec2<D>& u) {
+  LightChoice<D> choice = BeginChoice(d, view, active, position, normal, u_pick);
+  while (!IsChosen(d, choice)) ChooseOn(d, view, choice);
+  return SampleChosen(d, view, active, choice, position, u);
 }
 
 /// Density with which `SampleLight` at `position` returns the point of the triangle light `light`

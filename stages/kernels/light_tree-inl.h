@@ -58,8 +58,9 @@ template <class D>
 struct NodeLanes {
   Vec3<D> center, axis;
   Real<D> radius, signed_power;
-  Real<D> cos_o, cos_e;
-  Int<D> child_or_light, parent;
+  Angle<D> o;
+  Real<D> cos_e;
+  Int<D> child_or_light;
 };
 template <class D>
 HWY_INLINE NodeLanes<D> LoadNode(D d, const LightNode* nodes, Int<D> node) {
@@ -71,10 +72,9 @@ HWY_INLINE NodeLanes<D> LoadNode(D d, const LightNode* nodes, Int<D> node) {
   lanes.radius = sphere.w;
   lanes.axis = {emission.x, emission.y, emission.z};
   lanes.signed_power = emission.w;
-  lanes.cos_o = rest.x;
-  lanes.cos_e = rest.y;
-  lanes.child_or_light = QuadInt(d, nodes, node, offsetof(LightNode, child_or_light), rest.z);
-  lanes.parent = QuadInt(d, nodes, node, offsetof(LightNode, parent), rest.w);
+  lanes.o = {rest.x, rest.y};
+  lanes.cos_e = rest.z;
+  lanes.child_or_light = QuadInt(d, nodes, node, offsetof(LightNode, child_or_light), rest.w);
   return lanes;
 }
 
@@ -86,8 +86,7 @@ HWY_INLINE Real<D> EmissionBound(D d, const NodeLanes<D>& node, Real<D> cos_w,
                                  const Angle<D>& subtended) {
   const Mask<D> two_sided = hn::Lt(node.signed_power, hn::Zero(d));
   const Angle<D> w = AngleFromCos(d, hn::IfThenElse(two_sided, hn::Abs(cos_w), cos_w));
-  const Angle<D> o = AngleFromCos(d, node.cos_o);
-  const Real<D> cos = SubtractClamped(d, SubtractClamped(d, w, o), subtended).cos;
+  const Real<D> cos = SubtractClamped(d, SubtractClamped(d, w, node.o), subtended).cos;
   return hn::IfThenElseZero(hn::Gt(cos, node.cos_e - Splat(d, kCullMargin)),
                             hn::Max(cos, Splat(d, kLeastEmission)));
 }
@@ -141,12 +140,13 @@ template <class D>
 struct Refill {
   Uint<D> state;
 
-  HWY_INLINE Refill(D, const Vec3<D>& position, Real<D> u) {
+  static HWY_INLINE Refill Make(D, const Vec3<D>& position, Real<D> u) {
     const UintTag<D> du;
-    state = hn::BitCast(du, u);
+    Uint<D> state = hn::BitCast(du, u);
     for (const Real<D>& seed : {position.x, position.y, position.z}) {
       state = Mix(state + hn::BitCast(du, seed) + hn::Set(du, 0x9e3779b9u));
     }
+    return {state};
   }
   HWY_INLINE Real<D> Next(D d) {
     const UintTag<D> du;
@@ -179,46 +179,90 @@ HWY_INLINE LightPick<D> PickUniform(D d, const LightView& view, Mask<D> active, 
           hn::Min(place - whole, Splat(d, kLargestBelowOne))};
 }
 
-/// Descends from the root in every active lane, with one number per lane.
+/// Lanes on their way from the root to a light, with one number per lane. Several can be on their
+/// way in turns, so that one's nodes come from memory while another one decides.
+template <class D>
+struct Descent {
+  Receiver<D> receiver;
+  Refill<D> refill;
+  LightPick<D> pick;  // of lanes that are no longer active: the result
+  Int<D> child;
+  Mask<D> active;
+};
+
+template <class D>
+HWY_INLINE Descent<D> StartDescent(D d, const LightView& view, Mask<D> active,
+                                   const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
+  const IntTag<D> di;
+  const Mask<D> none = hn::Lt(u, u);
+  Descent<D> descent = {MakeReceiver(d, position, normal),
+                        Refill<D>::Make(d, position, u),
+                        {hn::Set(di, kNone), hn::IfThenElseZero(active, Splat(d, 1)), u},
+                        hn::Zero(di),
+                        active};
+  if (view.uniform_count > 0) {
+    descent.pick = PickUniform(d, view, active, u);
+    descent.active = none;
+  } else if (view.node_count == 0) {
+    descent.pick.probability = hn::Zero(d);
+    descent.active = none;
+  } else {
+    descent.child = FieldInt(d, view.nodes, hn::Zero(di), offsetof(LightNode, child_or_light));
+  }
+  return descent;
+}
+
+/// Asks for the pairs that the lanes will compare next.
+template <class D>
+HWY_INLINE void PrefetchPairs(D, const LightNode* nodes, Int<D> pairs) {
+  HWY_ALIGN int32_t at[hn::MaxLanes(D())];
+  hn::Store(pairs, IntTag<D>(), at);
+  for (const int32_t pair : at) {
+    __builtin_prefetch(&nodes[pair]);
+    __builtin_prefetch(&nodes[pair + 1]);
+  }
+}
+
+/// One level down, in the lanes that are active.
+template <class D>
+HWY_INLINE void Descend(D d, const LightView& view, Descent<D>& to) {
+  const IntTag<D> di;
+  const Int<D> zero = hn::Zero(di);
+  const Mask<D> leaf = hn::And(to.active, ToMask(d, hn::Lt(to.child, zero)));
+  to.pick.light = hn::IfThenElse(ToIntMask(d, leaf), hn::Not(to.child), to.pick.light);
+  to.active = hn::AndNot(leaf, to.active);
+  if (hn::AllFalse(d, to.active)) return;
+
+  const Int<D> pair = hn::IfThenElseZero(ToIntMask(d, to.active), to.child);
+  const NodeLanes<D> left = LoadNode(d, view.nodes, pair);
+  const NodeLanes<D> right = LoadNode(d, view.nodes, pair + hn::Set(di, 1));
+  const Real<D> left_importance = Importance(d, left, to.receiver);
+  const Real<D> right_importance = Importance(d, right, to.receiver);
+  const Real<D> sum = left_importance + right_importance;
+  const Mask<D> dark = hn::And(to.active, hn::Not(hn::Gt(sum, hn::Zero(d))));
+  to.pick.probability = hn::IfThenZeroElse(dark, to.pick.probability);
+  to.active = hn::AndNot(dark, to.active);
+
+  const Real<D> p = LeftProbability(d, left_importance, right_importance);
+  const Real<D> u = to.pick.u_remapped;
+  const Mask<D> go_left = hn::Lt(u, p);
+  to.child = hn::IfThenElse(ToIntMask(d, go_left), left.child_or_light, right.child_or_light);
+  PrefetchPairs(d, view.nodes, hn::Max(to.child, zero));
+  const Real<D> q = hn::IfThenElse(go_left, p, Splat(d, 1) - p);
+  const Real<D> rest = hn::IfThenElse(go_left, u, u - p);
+  const Real<D> refilled = hn::MulAdd(to.refill.Next(d), Splat(d, 1.0 / (1 << 24)), rest);
+  const Real<D> remapped = hn::Min(SafeDiv(d, refilled, q), Splat(d, kLargestBelowOne));
+  to.pick.u_remapped = hn::IfThenElse(to.active, remapped, u);
+  to.pick.probability = hn::IfThenElse(to.active, to.pick.probability * q, to.pick.probability);
+}
+
+/// A light for every active lane.
 template <class D>
 HWY_INLINE LightPick<D> PickLight(D d, const LightView& view, Mask<D> active,
                                   const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
-  if (view.uniform_count > 0) return PickUniform(d, view, active, u);
-  const IntTag<D> di;
-  const Int<D> zero = hn::Zero(di), none = hn::Set(di, kNone);
-  const Receiver<D> receiver = MakeReceiver(d, position, normal);
-  LightPick<D> pick = {none, hn::IfThenElseZero(active, Splat(d, 1)), u};
-  if (view.node_count == 0) return {none, hn::Zero(d), u};
-
-  Refill<D> refill(d, position, u);
-  Int<D> child = FieldInt(d, view.nodes, zero, offsetof(LightNode, child_or_light));
-  while (!hn::AllFalse(d, active)) {
-    const Mask<D> leaf = hn::And(active, ToMask(d, hn::Lt(child, zero)));
-    pick.light = hn::IfThenElse(ToIntMask(d, leaf), hn::Not(child), pick.light);
-    active = hn::AndNot(leaf, active);
-    if (hn::AllFalse(d, active)) break;
-
-    const Int<D> pair = hn::IfThenElseZero(ToIntMask(d, active), child);
-    const NodeLanes<D> left = LoadNode(d, view.nodes, pair);
-    const NodeLanes<D> right = LoadNode(d, view.nodes, pair + hn::Set(di, 1));
-    const Real<D> left_importance = Importance(d, left, receiver);
-    const Real<D> right_importance = Importance(d, right, receiver);
-    const Real<D> sum = left_importance + right_importance;
-    const Mask<D> dark = hn::And(active, hn::Not(hn::Gt(sum, hn::Zero(d))));
-    pick.probability = hn::IfThenZeroElse(dark, pick.probability);
-    active = hn::AndNot(dark, active);
-
-    const Real<D> p = LeftProbability(d, left_importance, right_importance);
-    const Mask<D> go_left = hn::Lt(pick.u_remapped, p);
-    const Real<D> q = hn::IfThenElse(go_left, p, Splat(d, 1) - p);
-    const Real<D> rest = hn::IfThenElse(go_left, pick.u_remapped, pick.u_remapped - p);
-    const Real<D> refilled = hn::MulAdd(refill.Next(d), Splat(d, 1.0 / (1 << 24)), rest);
-    const Real<D> remapped = hn::Min(SafeDiv(d, refilled, q), Splat(d, kLargestBelowOne));
-    pick.u_remapped = hn::IfThenElse(active, remapped, pick.u_remapped);
-    pick.probability = hn::IfThenElse(active, pick.probability * q, pick.probability);
-    child = hn::IfThenElse(ToIntMask(d, go_left), left.child_or_light, right.child_or_light);
-  }
-  return pick;
+  Descent<D> descent = StartDescent(d, view, active, position, normal, u);
+  while (!hn::AllFalse(d, descent.active)) Descend(d, view, descent);
+  return descent.pick;
 }
 
 /// Probability with which `PickLight` returns `light` (kNone allowed: 0), climbing from its leaf.
@@ -245,13 +289,14 @@ HWY_INLINE Real<D> PickProbability(D d, const LightView& view, Mask<D> active,
     const Real<D> left_importance = Importance(d, left, receiver);
     const Real<D> right_importance = Importance(d, right, receiver);
     const auto is_left = hn::Eq(here, pair);
-    active = hn::And(active, ToMask(d, hn::Gt(left.parent, hn::Set(di, kNone))));
+    const Int<D> parent = FieldInt(d, view.nodes, pair, offsetof(LightNode, parent));
+    active = hn::And(active, ToMask(d, hn::Gt(parent, hn::Set(di, kNone))));
     const Mask<D> dark = hn::Not(hn::Gt(left_importance + right_importance, hn::Zero(d)));
     const Real<D> p = LeftProbability(d, left_importance, right_importance);
     const Real<D> q =
         hn::IfThenZeroElse(dark, hn::IfThenElse(ToMask(d, is_left), p, Splat(d, 1) - p));
     probability = hn::IfThenElse(active, probability * q, probability);
-    node = hn::IfThenElse(ToIntMask(d, active), left.parent, node);
+    node = hn::IfThenElse(ToIntMask(d, active), parent, node);
     active = hn::And(active, hn::Gt(probability, hn::Zero(d)));
   }
   return probability;

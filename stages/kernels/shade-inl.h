@@ -295,12 +295,11 @@ struct ShadowRay {
 /// One light, one shadow ray.
 template <class D>
 HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& v,
-                                  const Scatter<D>& s, Mask<D> active) {
-  const Real<D> u_pick = Sample1D(d, v.key, v.number, Purpose::light_pick);
+                                  const Scatter<D>& s, const lights::LightChoice<D>& choice,
+                                  Mask<D> active) {
   const Vec2<D> u_point = Sample2D(d, v.key, v.number, Purpose::light_point);
-  const Vec3<D> normal = DecodeNormal(d, s.packed_normal);
   const lights::LightSample<D> light =
-      lights::SampleLight(d, c.lights, active, s.origin, normal, u_pick, u_point);
+      lights::SampleChosen(d, c.lights, active, choice, s.origin, u_point);
   const Real<D> zero = hn::Zero(d);
   Mask<D> wanted = hn::And(hn::And(active, hn::Gt(light.pdf, zero)),
                            hn::Gt(Dot(light.wi, v.surface.geometric), zero));
@@ -429,6 +428,7 @@ struct Shading {
   Vertex<D> v;
   Vec3<D> base_color;
   Scatter<D> s;
+  lights::LightChoice<D> choice;
   ShadowRay<D> shadow;
 };
 
@@ -475,8 +475,15 @@ HWY_INLINE void Prepare(D d, const KernelContext& c, Shading<D>& w) {
 }
 
 template <class D>
+HWY_INLINE void BeginChoice(D d, const KernelContext& c, Shading<D>& w) {
+  const Real<D> u = Sample1D(d, w.v.key, w.v.number, Purpose::light_pick);
+  const Vec3<D> normal = DecodeNormal(d, w.s.packed_normal);
+  w.choice = lights::BeginChoice(d, c.lights, w.active, w.s.origin, normal, u);
+}
+
+template <class D>
 HWY_INLINE void Connect(D d, const KernelContext& c, Shading<D>& w) {
-  w.shadow = NextEvent(d, c, w.v, w.s, w.active);
+  w.shadow = NextEvent(d, c, w.v, w.s, w.choice, w.active);
 }
 
 template <class D>
@@ -492,6 +499,8 @@ HWY_NOINLINE void ShadeLanes(D d, const KernelContext& c, const PathLanes<D>& p,
   Arrive(d, c, p, w, next);
   if (w.ended) return;
   Prepare(d, c, w);
+  BeginChoice(d, c, w);
+  while (!lights::IsChosen(d, w.choice)) lights::ChooseOn(d, c.lights, w.choice);
   Connect(d, c, w);
   Leave(d, c, w, next);
 }
@@ -500,6 +509,7 @@ template <class D>
 HWY_NOINLINE void ArriveAll(D d, const KernelContext& c, PathState* paths,
                             std::span<const uint32_t> slots, Shading<D>* w, Next* next) {
   for (size_t i = 0; i < slots.size(); i += hn::Lanes(d)) {
+    PrefetchSlots(paths, slots, i + hn::Lanes(d), hn::Lanes(d));
     Arrive(d, c, LoadSlots(d, paths, slots.data() + i, slots.size() - i), *w++, next + i);
   }
 }
@@ -507,6 +517,21 @@ template <class D>
 HWY_NOINLINE void PrepareAll(D d, const KernelContext& c, std::span<Shading<D>> all) {
   for (Shading<D>& w : all) {
     if (!w.ended) Prepare(d, c, w);
+  }
+}
+/// Vectors take turns, level by level of the light tree.
+template <class D>
+HWY_NOINLINE void ChooseAll(D d, const KernelContext& c, std::span<Shading<D>> all) {
+  for (Shading<D>& w : all) {
+    if (!w.ended) BeginChoice(d, c, w);
+  }
+  for (bool all_chosen = false; !all_chosen;) {
+    all_chosen = true;
+    for (Shading<D>& w : all) {
+      if (w.ended || lights::IsChosen(d, w.choice)) continue;
+      lights::ChooseOn(d, c.lights, w.choice);
+      all_chosen = false;
+    }
   }
 }
 template <class D>
@@ -539,6 +564,7 @@ HWY_INLINE void ShadePaths(D d, const KernelContext& c, PathState* paths,
       ArriveAll(d, c, paths, some, work, next);
       const std::span<Shading<D>> all(work, (some.size() + hn::Lanes(d) - 1) / hn::Lanes(d));
       PrepareAll(d, c, all);
+      ChooseAll(d, c, all);
       ConnectAll(d, c, all);
       LeaveAll(d, c, all, next);
     }

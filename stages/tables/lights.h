@@ -38,14 +38,15 @@ static_assert(sizeof(Light) == 64);
 struct alignas(64) LightNode {
   float center[3] = {0, 0, 0};  // sphere around everything that emits
   float radius = 0;
-  float axis[3] = {0, 0, 1};    // cone of emission normals (Conty Estevez & Kulla 2018)
-  float signed_power = 0;       // candela of luminance, summed, as a share of the whole tree's;
-                                // negative: the cone's opposite counts as well (two-sided emitters)
-  float cos_theta_o = 1;        // bound on the angle between an emitter's normal and the axis
+  float axis[3] = {0, 0, 1};  // cone of emission normals (Conty Estevez & Kulla 2018)
+  float signed_power = 0;     // candela of luminance, summed, as a share of the whole tree's;
+                              // negative: the cone's opposite counts as well (two-sided emitters)
+  float cos_theta_o = 1;      // bound on the angle between an emitter's normal and the axis
+  float sin_theta_o = 0;
   float cos_theta_e = 0;        // bound on the emission angle about a normal
   int32_t child_or_light = -1;  // inner: the left child, the right one follows it; leaf: ~light
   int32_t parent = -1;          // -1 at the root
-  int32_t pad[4] = {};
+  int32_t pad[3] = {};
 };
 static_assert(sizeof(LightNode) == 64);
 

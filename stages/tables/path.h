@@ -1,8 +1,10 @@
 // The state of one path: two cache lines that travel by slot number through the stages' queues.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace carpool::stages {
 
@@ -47,6 +49,21 @@ struct alignas(128) PathState {
                     // again for MIS
 };
 static_assert(sizeof(PathState) == 128);
+
+/// Asks for both cache lines of a path.
+template <class Path>
+void PrefetchPath(const Path* path) {
+  __builtin_prefetch(path);
+  __builtin_prefetch(&path->pixel);
+}
+static_assert(offsetof(PathState, pixel) == 64);
+
+/// The paths of `count` slots from `first` on, as far as there are any.
+template <class Path>
+void PrefetchSlots(const Path* paths, std::span<const uint32_t> slots, size_t first, size_t count) {
+  const size_t end = std::min(first + count, slots.size());
+  for (size_t i = first; i < end; ++i) PrefetchPath(&paths[slots[i]]);
+}
 
 enum PathFlags : uint32_t {
   kPathDepthMask = 0x1ff,  // scattering events so far

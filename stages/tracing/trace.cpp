@@ -148,7 +148,7 @@ void IntersectSlots(const TraceView& view, PathState* paths, std::span<const uin
   Packet<kSize> packet;
   TriangleName left[kSize];
   for (size_t i = 0; i < slots.size(); ++i) {
-    if (i + kSize < slots.size()) __builtin_prefetch(&paths[slots[i + kSize]]);
+    if (i + kSize < slots.size()) PrefetchPath(&paths[slots[i + kSize]]);
     PathState& path = paths[slots[i]];
     if (NeedsTracing(view, path)) {
       left[packet.count] = LastTriangle(path);
@@ -208,7 +208,7 @@ void TraceSlotShadows(const TraceView& view, const OpacityQuery& opacity, PathSt
                       std::span<const uint32_t> slots) {
   Packet<kSize> packet;
   for (size_t i = 0; i < slots.size(); ++i) {
-    if (i + kSize < slots.size()) __builtin_prefetch(&paths[slots[i + kSize]]);
+    if (i + kSize < slots.size()) PrefetchPath(&paths[slots[i + kSize]]);
     packet.Add(paths[slots[i]]);
     if (packet.count < kSize && i + 1 < slots.size()) continue;
     TracePacketShadows(view, opacity, packet);
