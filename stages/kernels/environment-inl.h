@@ -167,17 +167,28 @@ struct SelectionTables {
   int32_t count;
 };
 
+/// u in units of mass.
+template <class D>
+HWY_INLINE Int<D> CellOf(D d, Real<D> u) {
+  const Real<D> clamped = hn::Min(hn::Max(u, hn::Zero(d)), Splat(d, kLargestBelowOne));
+  return hn::ConvertTo(IntTag<D>(), clamped * Splat(d, kEnvironmentMass));
+}
+/// Where the guide has that cell of table `which`.
+template <class D>
+HWY_INLINE Int<D> GuideOf(D, const SelectionTables& tables, Int<D> which, Int<D> cell) {
+  return which * hn::Set(IntTag<D>(), GuideSize(tables.count)) +
+         hn::ShiftRightSame(cell, 24 - GuideBits(tables.count));
+}
+
 /// The last entry of table `which` whose cumulative mass is not above u's cell: entries without
 /// mass share their successor's (or the end's) and are never the last.
 template <class D>
 HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> which, Real<D> u) {
   const IntTag<D> di;
   const Int<D> one = hn::Set(di, 1);
-  const Real<D> clamped = hn::Min(hn::Max(u, hn::Zero(d)), Splat(d, kLargestBelowOne));
-  const Int<D> cell = hn::ConvertTo(di, clamped * Splat(d, kEnvironmentMass));
+  const Int<D> cell = CellOf(d, u);
   const Int<D> cdf = which * hn::Set(di, tables.count + 1);
-  const Int<D> guide = which * hn::Set(di, GuideSize(tables.count)) +
-                       hn::ShiftRightSame(cell, 24 - GuideBits(tables.count));
+  const Int<D> guide = GuideOf(d, tables, which, cell);
 
   // One load brings the bounds of three entries. What follows the end of a table is not looked at:
   // the end itself is above every cell.
@@ -240,18 +251,47 @@ HWY_INLINE Real<D> RowsFromPole(D d, const EnvironmentView& view,
   return hn::Max(hn::Min(north, south), hn::Zero(d));
 }
 
+/// Asks for the cache line of base[index] of each lane.
+template <class D, class T>
+HWY_INLINE void PrefetchEach(D, const T* base, Int<D> index) {
+  HWY_ALIGN int32_t at[hn::MaxLanes(D())];
+  hn::Store(index, IntTag<D>(), at);
+  for (const int32_t i : at) __builtin_prefetch(base + i);
+}
+
+/// A place on the map being drawn. Its three steps each begin with look-ups all over a large table;
+/// what a step will read is asked for at the end of the one before, so that other lanes can go
+/// through theirs meanwhile.
+template <class D>
+struct EnvironmentSearch {
+  TableEntry<D> row;          // of the first step
+  EnvironmentPlace<D> place;  // of the second
+};
+
+template <class D>
+HWY_INLINE void FindRow(D d, const EnvironmentView& view, const Vec2<D>& u,
+                        EnvironmentSearch<D>& search) {
+  const SelectionTables rows = {view.row_cdf, view.row_guide, view.height};
+  const SelectionTables columns = {view.column_cdf, view.column_guide, view.width};
+  search.row = InvertTable(d, rows, hn::Zero(IntTag<D>()), u.y);
+  PrefetchEach(d, columns.guide, GuideOf(d, columns, search.row.index, CellOf(d, u.x)));
+}
+
 /// A place with the density described above: tents are wrapped in s and reflected at the poles,
 /// which is what wrapping and clamping make of bilinear interpolation.
 template <class D>
-HWY_INLINE EnvironmentPlace<D> SamplePlace(D d, const EnvironmentView& view, const Vec2<D>& u) {
+HWY_INLINE void FindPlace(D d, const EnvironmentView& view, const Vec2<D>& u,
+                          EnvironmentSearch<D>& search) {
   const IntTag<D> di;
-  const SelectionTables rows = {view.row_cdf, view.row_guide, view.height};
   const SelectionTables columns = {view.column_cdf, view.column_guide, view.width};
-  const TableEntry<D> row = InvertTable(d, rows, hn::Zero(di), u.y);
+  const TableEntry<D>& row = search.row;
   const TableEntry<D> column = InvertTable(d, columns, row.index, u.x);
-  EnvironmentPlace<D> place;
+  EnvironmentPlace<D>& place = search.place;
   place.i = WrapColumn(d, PlaceUnderTent(d, column, place.fs), view.width);
   place.j = PlaceUnderTent(d, row, place.ft);
+  const EnvironmentTaps<D> taps = TapsAt(d, view, place);
+  PrefetchEach(d, view.texels, taps.at00);
+  PrefetchEach(d, view.texels, taps.at01);
 
   const Real<D> half = Splat(d, 0.5);
   const Mask<D> north = ToMask(d, hn::Lt(place.j, hn::Zero(di)));
@@ -260,7 +300,6 @@ HWY_INLINE EnvironmentPlace<D> SamplePlace(D d, const EnvironmentView& view, con
       hn::Or(hn::And(north, hn::Lt(place.ft, half)), hn::And(south, hn::Gt(place.ft, half)));
   place.ft = hn::IfThenElse(beyond, Splat(d, 1) - place.ft, place.ft);
   place.sin_theta = hn::Sin(d, RowsFromPole(d, view, place) * Splat(d, kPi / view.height));
-  return place;
 }
 
 template <class D>
@@ -276,14 +315,24 @@ HWY_INLINE Vec3<D> DirectionOfPlace(D d, const EnvironmentView& view,
           hn::Neg(place.sin_theta * hn::Cos(d, phi))};
 }
 
-/// A direction drawn in proportion to the map's luminance x sin(theta), bilinear like the map.
+/// A direction drawn in proportion to the map's luminance x sin(theta), bilinear like the map:
+/// the last step.
+template <class D>
+HWY_INLINE EnvironmentSample<D> SampleFound(D d, const EnvironmentView& view,
+                                            const EnvironmentSearch<D>& search) {
+  const EnvironmentValue<D> value = ValueAt(d, view, search.place);
+  return {DirectionOfPlace(d, view, search.place), value.radiance, value.pdf};
+}
+
+/// All three steps.
 template <class D>
 HWY_INLINE EnvironmentSample<D> SampleEnvironment(D d, const EnvironmentView& view,
                                                   const Vec2<D>& u) {
   if (view.width == 0) return {Splat3(d, 0, 1, 0), Splat3(d, 0, 0, 0), hn::Zero(d)};
-  const EnvironmentPlace<D> place = SamplePlace(d, view, u);
-  const EnvironmentValue<D> value = ValueAt(d, view, place);
-  return {DirectionOfPlace(d, view, place), value.radiance, value.pdf};
+  EnvironmentSearch<D> search;
+  FindRow(d, view, u, search);
+  FindPlace(d, view, u, search);
+  return SampleFound(d, view, search);
 }
 
 }  // namespace lights

@@ -145,8 +145,9 @@ HWY_INLINE LightSample<D> FromPunctual(D d, const LightView& view, Int<D> light,
 }
 
 template <class D>
-HWY_INLINE LightSample<D> FromEnvironment(D d, const LightView& view, const Vec2<D>& u) {
-  const EnvironmentSample<D> s = SampleEnvironment(d, view.environment, u);
+HWY_INLINE LightSample<D> FromEnvironment(D d, const LightView& view,
+                                          const EnvironmentSearch<D>& search) {
+  const EnvironmentSample<D> s = SampleFound(d, view.environment, search);
   LightSample<D> sample = NoLight(d);
   sample.wi = s.dir;
   sample.distance = Splat(d, kFarAway);
@@ -155,28 +156,38 @@ HWY_INLINE LightSample<D> FromEnvironment(D d, const LightView& view, const Vec2
   return sample;
 }
 
-/// Which light each lane shall sample, while it is being chosen.
+/// Which light each lane shall sample, while it is being chosen, and where on the environment.
 template <class D>
 struct LightChoice {
   KindChoice<D> kind;
-  Descent<D> descent;  // of the lanes whose kind is the tree
+  Vec2<D> u;                    // for the place on the light
+  Descent<D> descent;           // of the lanes whose kind is the tree
+  EnvironmentSearch<D> search;  // of those whose kind is the environment
+  bool placed;                  // is the search over?
 };
 
 /// Begins to choose; `normal` is unit length on the side that takes light, or zero for a receiver
 /// that takes it from all sides. `IsChosen` says when it is done, `ChooseOn` goes on.
 template <class D>
-HWY_INLINE LightChoice<D> BeginChoice(D d, const LightView& view, Mask<D> active,
-                                      const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
-  const KindChoice<D> kind = ChooseKind(d, view, active, u);
-  return {kind, StartDescent(d, view, kind.tree, position, normal, kind.u_remapped)};
+HWY_INLINE void BeginChoice(D d, const LightView& view, Mask<D> active, const Vec3<D>& position,
+                            const Vec3<D>& normal, Real<D> u_pick, const Vec2<D>& u,
+                            LightChoice<D>& choice) {
+  choice.kind = ChooseKind(d, view, active, u_pick);
+  choice.u = u;
+  choice.descent =
+      StartDescent(d, view, choice.kind.tree, position, normal, choice.kind.u_remapped);
+  choice.placed = hn::AllFalse(d, choice.kind.environment);
+  if (!choice.placed) FindRow(d, view.environment, u, choice.search);
 }
 template <class D>
 HWY_INLINE bool IsChosen(D d, const LightChoice<D>& choice) {
-  return hn::AllFalse(d, choice.descent.active);
+  return choice.placed && hn::AllFalse(d, choice.descent.active);
 }
 template <class D>
 HWY_INLINE void ChooseOn(D d, const LightView& view, LightChoice<D>& choice) {
-  Descend(d, view, choice.descent);
+  if (!choice.placed) FindPlace(d, view.environment, choice.u, choice.search);
+  choice.placed = true;
+  if (!hn::AllFalse(d, choice.descent.active)) Descend(d, view, choice.descent);
 }
 
 /// What was chosen, from the tree or from the infinite lights.
@@ -202,13 +213,12 @@ HWY_INLINE LightPick<D> PickOf(D d, const LightView& view, const LightChoice<D>&
 /// One sample of the light that was chosen for each active receiver.
 template <class D>
 HWY_INLINE LightSample<D> SampleChosen(D d, const LightView& view, Mask<D> active,
-                                       const LightChoice<D>& choice, const Vec3<D>& position,
-                                       const Vec2<D>& u) {
+                                       const LightChoice<D>& choice, const Vec3<D>& position) {
   LightSample<D> sample = NoLight(d);
   if (!HasLights(view)) return sample;
   const Mask<D> environment = choice.kind.environment;
   if (!hn::AllFalse(d, environment)) {
-    sample = Merge(d, environment, sample, FromEnvironment(d, view, u));
+    sample = Merge(d, environment, sample, FromEnvironment(d, view, choice.search));
   }
   const LightPick<D> pick = PickOf(d, view, choice);
   const IntTag<D> di;
@@ -221,7 +231,8 @@ HWY_INLINE LightSample<D> SampleChosen(D d, const LightView& view, Mask<D> activ
   const Mask<D> triangle = hn::And(has_light, name.triangle);
   const Mask<D> punctual = hn::AndNot(triangle, has_light);
   if (!hn::AllFalse(d, triangle)) {
-    sample = Merge(d, triangle, sample, FromTriangle(d, view, triangle, light, name, position, u));
+    sample = Merge(d, triangle, sample,
+                   FromTriangle(d, view, triangle, light, name, position, choice.u));
   }
   if (!hn::AllFalse(d, punctual)) {
     sample = Merge(d, punctual, sample, FromPunctual(d, view, light, position));
@@ -235,9 +246,10 @@ template <class D>
 HWY_INLINE LightSample<D> SampleLight(D d, const LightView& view, Mask<D> active,
                                       const Vec3<D>& position, const Vec3<D>& normal,
                                       Real<D> u_pick, const Vec2<D>& u) {
-  LightChoice<D> choice = BeginChoice(d, view, active, position, normal, u_pick);
+  LightChoice<D> choice;
+  BeginChoice(d, view, active, position, normal, u_pick, u, choice);
   while (!IsChosen(d, choice)) ChooseOn(d, view, choice);
-  return SampleChosen(d, view, active, choice, position, u);
+  return SampleChosen(d, view, active, choice, position);
 }
 
 /// Density with which `SampleLight` at `position` returns the point of the triangle light `light`

@@ -297,9 +297,7 @@ template <class D>
 HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& v,
                                   const Scatter<D>& s, const lights::LightChoice<D>& choice,
                                   Mask<D> active) {
-  const Vec2<D> u_point = Sample2D(d, v.key, v.number, Purpose::light_point);
-  const lights::LightSample<D> light =
-      lights::SampleChosen(d, c.lights, active, choice, s.origin, u_point);
+  const lights::LightSample<D> light = lights::SampleChosen(d, c.lights, active, choice, s.origin);
   const Real<D> zero = hn::Zero(d);
   Mask<D> wanted = hn::And(hn::And(active, hn::Gt(light.pdf, zero)),
                            hn::Gt(Dot(light.wi, v.surface.geometric), zero));
@@ -476,9 +474,10 @@ HWY_INLINE void Prepare(D d, const KernelContext& c, Shading<D>& w) {
 
 template <class D>
 HWY_INLINE void BeginChoice(D d, const KernelContext& c, Shading<D>& w) {
-  const Real<D> u = Sample1D(d, w.v.key, w.v.number, Purpose::light_pick);
+  const Real<D> u_pick = Sample1D(d, w.v.key, w.v.number, Purpose::light_pick);
+  const Vec2<D> u_point = Sample2D(d, w.v.key, w.v.number, Purpose::light_point);
   const Vec3<D> normal = DecodeNormal(d, w.s.packed_normal);
-  w.choice = lights::BeginChoice(d, c.lights, w.active, w.s.origin, normal, u);
+  lights::BeginChoice(d, c.lights, w.active, w.s.origin, normal, u_pick, u_point, w.choice);
 }
 
 template <class D>
