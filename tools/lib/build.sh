@@ -25,18 +25,48 @@ run_logged() {
 # shellcheck source=tools/lib/packages.sh
 source "$carpool_root/tools/lib/packages.sh"
 
-# is_configured PRESET tells whether the build folder agrees with the presets and with CARPOOL_WERROR, if set.
+# cache_has PRESET NAME:TYPE=VALUE tells whether the build folder was configured with that.
+cache_has() {
+  grep -qsx -- "$2" "$carpool_root/build/$1/CMakeCache.txt"
+}
+
+# compiles COMPILER tells whether it finds its way.
+compiles() {
+  echo '#include <vector>' | "$1" -x c++ -fsyntax-only - 2>/dev/null
+}
+
+# compiler_of PRESET prints the compiler: clang for what people run, because it makes shading a tenth faster; the default
+# one, g++, for the rest, so that tests see both. CXX, if set, decides.
+compiler_of() {
+  local clang
+  if [[ -n ${CXX:-} ]]; then
+    command -v "$CXX" || echo "$CXX"
+  elif [[ $1 == release ]] && clang=$(command -v clang++) &&
+    { cache_has "$1" "CMAKE_CXX_COMPILER:[A-Z]*=$clang" || compiles "$clang"; }; then
+    echo "$clang"
+  else
+    command -v c++
+  fi
+}
+
+# is_configured PRESET tells whether the build folder agrees with the presets, the compiler and CARPOOL_WERROR, if set.
 is_configured() {
   local build=$carpool_root/build/$1
   [[ -f $build/build.ninja && ! $carpool_root/CMakePresets.json -nt $build/CMakeCache.txt ]] || return 1
-  [[ -z ${CARPOOL_WERROR:-} ]] || grep -qx "CARPOOL_WERROR:BOOL=$CARPOOL_WERROR" "$build/CMakeCache.txt"
+  cache_has "$1" "CMAKE_CXX_COMPILER:[A-Z]*=$(compiler_of "$1")" || return 1
+  [[ -z ${CARPOOL_WERROR:-} ]] || cache_has "$1" "CARPOOL_WERROR:BOOL=$CARPOOL_WERROR"
 }
 
 configure() {
-  local preset=$1 build=$carpool_root/build/$1 options=()
+  local preset=$1 build=$carpool_root/build/$1 compiler options=()
   is_configured "$preset" && return
+  compiler=$(compiler_of "$preset")
+  options+=("-DCMAKE_CXX_COMPILER=$compiler")
   [[ -n ${CARPOOL_WERROR:-} ]] && options+=("-DCARPOOL_WERROR=$CARPOOL_WERROR")
-  say "configuring ($preset)"
+  say "configuring ($preset, $(basename "$compiler"))"
+  if [[ -f $build/CMakeCache.txt ]] && ! cache_has "$preset" "CMAKE_CXX_COMPILER:[A-Z]*=$compiler"; then
+    rm -rf "$build/CMakeCache.txt" "$build/CMakeFiles"  # cmake would forget the options given here
+  fi
   (cd "$carpool_root" && run_logged "$build/configure.log" cmake --preset "$preset" "${options[@]}") ||
     fail 2 "the build could not be configured (its output is above)"
   touch "$build/CMakeCache.txt"  # cmake leaves its old date where nothing changed

@@ -5,6 +5,7 @@
 # is there, however it was installed: a command, or a header (any one of several).
 readonly carpool_packages=(
   'g++                 command:c++'
+  'clang               command:clang++'
   'cmake               command:cmake'
   'ninja-build         command:ninja'
   'pkg-config          command:pkg-config'
