@@ -22,7 +22,7 @@ void RoundToFloat(FilmSum& sum) {
     const __int128 exact = sum.Quanta(c);
     const auto rounded = static_cast<__int128>(static_cast<float>(exact));
     sum.low[c] = static_cast<uint64_t>(rounded);
-    sum.rest += static_cast<uint64_t>((rounded >> 64) - (exact >> 64)) << (FilmSum::kRestBits * c);
+    sum.AddToRest(c, static_cast<int64_t>((rounded >> 64) - (exact >> 64)));
   }
 }
 
@@ -46,7 +46,8 @@ FilmAccumulator::FilmAccumulator(uint32_t width, uint32_t height, const FilmPlan
 }
 
 uint64_t FilmAccumulator::bytes() const {
-  return pixels_.size() * sizeof(FilmPixel) + (albedo_.size() + normal_.size()) * sizeof(int64_t) +
+  return pixels_.size() * sizeof(FilmPixel) + wraps_.size() * sizeof(uint32_t) +
+         (albedo_.size() + normal_.size()) * sizeof(int64_t) +
          (depth_.size() + object_.size() + material_.size()) * sizeof(uint32_t);
 }
 
@@ -101,8 +102,15 @@ void FilmAccumulator::AddOther(uint32_t pixel, uint32_t sample, const float radi
   }
   FilmSum& sum = pixels_[pixel][sample % kScrambles];
   for (size_t c = 0; c < 3; ++c) sum.Add(c, ToFixed(channels[c]));
-  sum.Count();
+  if (sum.Count()) NoteWrap(pixel, sum);
   if (IsMutant(Mutant::float_film)) RoundToFloat(sum);
+}
+
+/// After 2^16 samples of one scramble, which few renders have, the pixel needs a longer count.
+void FilmAccumulator::NoteWrap(uint32_t pixel, const FilmSum& sum) {
+  if (sum.Samples() != 0) return;
+  std::call_once(has_wraps_, [&] { wraps_.resize(pixels_.size()); });
+  ++wraps_[pixel];  // under the pixel's lock
 }
 
 SampleLedger FilmAccumulator::Ledger() const {

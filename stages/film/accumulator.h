@@ -19,41 +19,41 @@ constexpr int kScrambles = 4;             // samples belong by index to four ind
 constexpr double kFilmQuantum = 0x1p-32;  // cd/m2 (or the file's unit) of the lowest bit
 constexpr double kFilmLargest = 0x1p30;   // larger channels are clamped and counted: 2^62 quanta
 
-/// The samples of one pixel and scramble: their number and RGB sums in 79-bit fixed point: range
-/// +-2^46 at quantum 2^-32, hence no overflow while samples x mean < 2^46. Half a cache line.
+/// The samples of one pixel and scramble: their RGB sums in 80-bit fixed point, range +-2^47 at
+/// quantum 2^-32, hence no overflow while samples x mean < 2^47; and their number modulo 2^16. Half
+/// a cache line.
 struct alignas(32) FilmSum {
   uint64_t low[3];  // the sums modulo 2^64
-  uint64_t rest;    // R + 2^15 G + 2^30 B + 2^45 samples, where R, G, B are what `low` leaves out
-
-  static constexpr int kRestBits = 15;
+  uint64_t rest;    // R + 2^16 G + 2^32 B + 2^48 samples, where R, G, B are what `low` leaves out
 
   /// Adds quanta to one channel.
   void Add(size_t channel, int64_t quanta) {
     const uint64_t old = low[channel];
     low[channel] = old + static_cast<uint64_t>(quanta);
-    const int64_t carry = (low[channel] < old ? 1 : 0) - (quanta < 0 ? 1 : 0);
-    rest += static_cast<uint64_t>(carry) << (kRestBits * channel);
+    AddToRest(channel, (low[channel] < old ? 1 : 0) - (quanta < 0 ? 1 : 0));
   }
-  void Count() { rest += uint64_t{1} << (3 * kRestBits); }
+  /// Adds 2^64 quanta `times` times.
+  void AddToRest(size_t channel, int64_t times) {
+    rest += static_cast<uint64_t>(times) << (16 * channel);
+  }
+  /// One sample more; true if their number may have become 0 by it.
+  bool Count() {
+    rest += uint64_t{1} << 48;
+    return (((rest >> 48) + 1) & 0xffff) <= 1;  // a negative sum below takes 1 from what is seen
+  }
 
-  uint32_t Samples() const { return static_cast<uint32_t>(Digit(3)); }
+  uint32_t Samples() const { return static_cast<uint16_t>(Digit(3)); }
   __int128 Quanta(size_t channel) const {
     return (static_cast<__int128>(Digit(channel)) << 64) + low[channel];
   }
 
  private:
-  /// Part 0 to 2 of `rest`, or the number of samples. Parts are signed: what is below must go
-  /// first.
-  int64_t Digit(size_t part) const {
+  /// One of the four parts of `rest`. They are signed, so those below must be taken off first.
+  int16_t Digit(size_t part) const {
     uint64_t above = rest;
-    int64_t digit = 0;
-    for (size_t i = 0; i <= part; ++i) {
-      constexpr int kUnused = 64 - kRestBits;
-      digit =
-          i == 3 ? static_cast<int64_t>(above) : static_cast<int64_t>(above << kUnused) >> kUnused;
-      above = (above - static_cast<uint64_t>(digit)) >> kRestBits;
-    }
-    return digit;
+    for (size_t i = 0; i < part; ++i)
+      above = (above - static_cast<uint64_t>(static_cast<int16_t>(above))) >> 16;
+    return static_cast<int16_t>(above);
   }
 };
 using FilmPixel = std::array<FilmSum, kScrambles>;
@@ -162,7 +162,7 @@ class FilmAccumulator {
   uint32_t Samples(uint32_t pixel) const {
     uint32_t samples = 0;
     for (const FilmSum& sum : pixels_[pixel]) samples += sum.Samples();
-    return samples;
+    return wraps_.empty() ? samples : samples + (wraps_[pixel] << 16);
   }
   /// What was entered so far; sums over the film, so not cheap.
   SampleLedger Ledger() const;
@@ -187,7 +187,7 @@ class FilmAccumulator {
       return AddOther(pixel, sample, radiance);
     FilmSum& sum = pixels_[pixel][sample % kScrambles];
     for (size_t c = 0; c < 3; ++c) sum.Add(c, ToFixed(radiance[c]));
-    sum.Count();
+    if (sum.Count()) NoteWrap(pixel, sum);
   }
   /// Can the sample be added as it is, and is nothing of it negative?
   bool IsPlain(const float radiance[3]) const {
@@ -197,6 +197,7 @@ class FilmAccumulator {
   }
   static int64_t ToFixed(double value) { return std::llrint(value * (1 / kFilmQuantum)); }
   void AddOther(uint32_t pixel, uint32_t sample, const float radiance[3]);
+  void NoteWrap(uint32_t pixel, const FilmSum& sum);
   void Enter(SampleFault fault, uint32_t pixel, uint32_t sample);
   void Mend(uint32_t pixel, uint32_t sample, double channels[3]);
 
@@ -208,6 +209,8 @@ class FilmAccumulator {
   std::mutex clamp_mutex_;
   __int128 removed_[3] = {0, 0, 0};  // by the clamp, in quanta
   HugeVector<FilmPixel> pixels_;
+  std::once_flag has_wraps_;
+  std::vector<uint32_t> wraps_;  // how often a pixel's counts became 0; empty until one does
   std::vector<int64_t> albedo_, normal_;  // 3 per pixel, quantum 2^-32
   std::vector<float> depth_;
   std::vector<uint32_t> object_, material_;

@@ -20,7 +20,7 @@ using Constraints = tbb::task_arena::constraints;
 TEST(AffinityTest, TheRunMakesAnArenaWithTheseConstraints) {
   for (const auto node : tbb::info::numa_nodes()) {
     carpool::RunOptions options{.in_flight = 500};
-    options.constraints = Constraints(node);
+    options.constraints = Constraints().set_numa_id(node);
     RandomGraph random({.seed = 14, .items = 3000});
     const auto report = carpool::run(random.graph(), options);
     EXPECT_EQ(random.counted(), random.expected());
@@ -34,7 +34,7 @@ TEST(AffinityTest, TheRunMakesAnArenaWithTheseConstraints) {
 
 TEST(AffinityTest, AnArenaOfTheCallersMayHaveThem) {
   for (const auto node : tbb::info::numa_nodes()) {
-    tbb::task_arena arena{Constraints(node)};
+    tbb::task_arena arena{Constraints().set_numa_id(node)};
     RandomGraph random({.seed = 15, .items = 3000});
     const auto report = carpool::run(random.graph(), {.arena = &arena, .in_flight = 500});
     EXPECT_EQ(random.counted(), random.expected());

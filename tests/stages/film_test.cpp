@@ -47,6 +47,26 @@ TEST(Film, SumsDoNotDependOnOrder) {
   EXPECT_EQ(threaded.Samples(0), samples.size());
 }
 
+// A pixel's count is kept in pieces of 16 bits beside what the sums leave over 64, which may be
+// negative.
+TEST(Film, CountsGoOnPastSixteenBitsBesideSumsOfAnySign) {
+  constexpr uint32_t kSamples = 70000 * kScrambles;
+  FilmAccumulator film(2, 1, {});
+  for (uint32_t i = 0; i < kSamples; ++i) {
+    const float below[3] = {-1, 2, i % 8 < 4 ? -1e9f : 1e9f};
+    film.Add(1, i, below);
+    if (i == 65536 * kScrambles - 2) EXPECT_EQ(film.Samples(1), i + 1);
+    if (i == 65536 * kScrambles - 1) EXPECT_EQ(film.Samples(1), i + 1);
+  }
+  EXPECT_EQ(film.Samples(1), kSamples);
+  EXPECT_EQ(film.Samples(0), 0u);
+  for (int g = 0; g < kScrambles; ++g) {
+    EXPECT_EQ(film.Sum(1, g, 0), -70000.0);
+    EXPECT_EQ(film.Sum(1, g, 1), 140000.0);
+    EXPECT_EQ(film.Sum(1, g, 2), 0.0);
+  }
+}
+
 // Many threads, each with one writer at a time, whose lock goes from tile to tile: every sample of
 // every pixel is there. The widths are odd, so that tiles are cut and share locks.
 TEST(Film, WritersOfManyTilesLoseNothing) {

@@ -44,6 +44,7 @@ quietly "$cmake" --build "$folder/fetched" --parallel 2
 expect FetchContent "$folder/fetched/outsider"
 
 # Every public header stands alone, and needs nothing that is not installed.
+read -ra flags <<<"$(PKG_CONFIG_PATH=$pc "$pkg_config" --cflags carpool)"
 for header in "$folder"/moved/include/carpool/*.h; do
   quietly "$cxx" -std=c++20 -Wall -Wextra -Werror -fsyntax-only -x c++ "${flags[@]}" -include "$header" /dev/null
 done
