@@ -23,15 +23,13 @@ inline CameraGroup TraceCameraGroup(const KernelContext& c, CameraKernel camera,
                                     const CameraPacket& packet, PathState* paths, uint32_t first) {
   CameraGroup group;
   std::array<PathState*, 8> traced = {};
-  for (uint32_t i = 0; i < 8; ++i) {
-    const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
-    if (x >= c.width || y >= c.height) continue;
+  EachPixel(packet, c.width, c.height, [&](uint32_t i, uint32_t pixel) {
     const uint32_t slot = first + i;
-    paths[slot].pixel = y * c.width + x;
+    paths[slot].pixel = pixel;
     paths[slot].sample = packet.sample;
     traced[i] = &paths[slot];
     group.slots[group.count++] = slot;
-  }
+  });
   camera(c, paths, {group.slots.data(), group.count});
   IntersectPacket(c.trace, traced.data());
   return group;

@@ -25,6 +25,7 @@ class SlotPool {
 
   uint32_t capacity() const { return capacity_; }
 
+  /// Fills `slots`.
   void Take(uint32_t worker, std::span<uint32_t> slots) {
     std::vector<uint32_t>& free = local_[worker].free;
     while (!slots.empty()) {

@@ -189,15 +189,6 @@ SourceStatus Wavefront::ClaimPackets(SourceContext& source, Emitter& out) {
   return more ? SourceStatus::more : SourceStatus::exhausted;
 }
 
-/// The pixels of a packet that are in the image; `visit(lane, pixel)`.
-template <class Visit>
-void EachPixel(const KernelContext& c, const CameraPacket& packet, const Visit& visit) {
-  for (uint32_t i = 0; i < kGroupWidth * kGroupHeight; ++i) {
-    const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
-    if (x < c.width && y < c.height) visit(i, y * c.width + x);
-  }
-}
-
 void Wavefront::CameraKernel(const Batch<CameraPacket>& batch, Emitter& out) {
   const FlushDenormals denormals;
   WorkerTally& tally = tallies_[batch.worker];
@@ -212,12 +203,12 @@ void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worke
   std::array<Slot, kPacketsAtOnce * 8> taken;
   size_t count = 0;
   for (const CameraPacket& packet : packets)
-    EachPixel(c_, packet, [&](uint32_t, uint32_t) { ++count; });
+    EachPixel(packet, c_.width, c_.height, [&](uint32_t, uint32_t) { ++count; });
   const std::span<Slot> slots(taken.data(), count);
   pool_.Take(worker, slots);
   size_t next = 0;
   for (const CameraPacket& packet : packets) {
-    EachPixel(c_, packet, [&](uint32_t, uint32_t pixel) {
+    EachPixel(packet, c_.width, c_.height, [&](uint32_t, uint32_t pixel) {
       PathState& path = paths_[slots[next++]];
       path.pixel = pixel;
       path.sample = packet.sample;
@@ -227,7 +218,8 @@ void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worke
   next = 0;
   for (const CameraPacket& packet : packets) {
     std::array<PathState*, 8> group = {};
-    EachPixel(c_, packet, [&](uint32_t i, uint32_t) { group[i] = &paths_[slots[next++]]; });
+    EachPixel(packet, c_.width, c_.height,
+              [&](uint32_t i, uint32_t) { group[i] = &paths_[slots[next++]]; });
     IntersectPacket(c_.trace, group.data());
   }
   EmitRuns(slots, out);
