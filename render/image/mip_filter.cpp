@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <memory>
 #include <vector>
 
 #include "render/image/srgb_encode.h"
@@ -18,7 +19,6 @@ using stages::TexelFormat;
 using stages::Texture;
 
 using Texel = std::array<float, 4>;  // straight colour in linear light, and alpha
-using Level = std::vector<Texel>;
 
 struct Size {
   int width, height;
@@ -49,22 +49,20 @@ std::vector<Taps> MakeTaps(int source, int target) {
   return taps;
 }
 
-/// Texels of one texture between words and linear light.
+/// Texels of one kind of texture between words and linear light. The kind is a template's matter
+/// because all of this is done for each texel of a scene while somebody waits.
+template <TexelFormat kFormat, bool kSrgb>
 class Codec {
  public:
-  explicit Codec(const Texture& texture)
-      : wide_(texture.format == TexelFormat::rgba16), srgb_(texture.srgb != 0) {
-    if (wide_ && srgb_) wide_table_ = stages::SrgbDecode16().data();
-  }
-
-  size_t WordsPerTexel() const { return wide_ ? 2 : 1; }
+  static constexpr size_t kWords = kFormat == TexelFormat::rgba16 ? 2 : 1;
 
   Texel Read(const uint32_t* word) const {
     Texel texel;
     for (size_t channel = 0; channel < 4; ++channel) {
-      const uint32_t code = wide_ ? word[channel / 2] >> (16 * (channel % 2)) & 0xffff
-                                  : word[0] >> (8 * channel) & 0xff;
-      texel[channel] = Decode(code, srgb_ && channel < 3);
+      const uint32_t code = kWords == 2 ? word[channel / 2] >> (16 * (channel % 2)) & 0xffff
+                                        : word[0] >> (8 * channel) & 0xff;
+      texel[channel] = kSrgb && channel < 3 ? table_[code]
+                                            : static_cast<float>(code) / static_cast<float>(kMost);
     }
     return texel;
   }
@@ -72,9 +70,9 @@ class Codec {
   void Write(const Texel& texel, uint32_t* word) const {
     std::array<uint32_t, 4> code;
     for (size_t channel = 0; channel < 4; ++channel) {
-      code[channel] = Encode(texel[channel], srgb_ && channel < 3);
+      code[channel] = kSrgb && channel < 3 ? EncodeColor(texel[channel]) : Round(texel[channel]);
     }
-    if (wide_) {
+    if constexpr (kWords == 2) {
       word[0] = code[0] | code[1] << 16;
       word[1] = code[2] | code[3] << 16;
     } else {
@@ -83,39 +81,41 @@ class Codec {
   }
 
  private:
-  float Decode(uint32_t code, bool srgb) const {
-    if (!srgb) return static_cast<float>(code) / (wide_ ? 65535.0f : 255.0f);
-    return wide_ ? wide_table_[code] : narrow_table_[code];
+  static constexpr double kMost = kWords == 2 ? 65535 : 255;
+
+  static const float* Table() {
+    return kWords == 2 ? stages::SrgbDecode16().data() : stages::SrgbDecode8().data();
   }
-  uint32_t Encode(float linear, bool srgb) const {
-    if (srgb && !wide_) return encoder_(linear);
-    const double encoded = srgb ? stages::LinearToSrgb(linear) : linear;
-    return static_cast<uint32_t>(encoded * (wide_ ? 65535.0 : 255.0) + 0.5);
+  static uint32_t Round(double share) {
+    return static_cast<uint32_t>(static_cast<int32_t>(share * kMost + 0.5));
+  }
+  uint32_t EncodeColor(float linear) const {
+    if constexpr (kWords == 1) return encoder_(linear);
+    return Round(stages::LinearToSrgb(linear));
   }
 
-  bool wide_, srgb_;
-  const float* narrow_table_ = stages::SrgbDecode8().data();
-  const float* wide_table_ = nullptr;
+  const float* table_ = kSrgb ? Table() : nullptr;
   const Srgb8Encoder& encoder_ = Srgb8Encoder::Instance();
 };
 
-/// Averages the source texels under two taps; `source(x, y)` gives one.
-template <class Source>
-Texel Average(const Taps& across, const Taps& down, bool alpha_weighted, const Source& source) {
+/// Averages the source texels under two taps; `source(x, y)` gives one. With kWeighted, colours
+/// count by their alpha.
+template <bool kWeighted, class Source>
+Texel Average(const Taps& across, const Taps& down, const Source& source) {
   Texel plain{}, weighted{};
   for (int j = 0; j < down.count; ++j) {
     for (int i = 0; i < across.count; ++i) {
       const Texel texel = source(across.first + i, down.first + j);
       const float weight =
           across.weight[static_cast<size_t>(i)] * down.weight[static_cast<size_t>(j)];
-      for (size_t channel = 0; channel < 3; ++channel) {
-        plain[channel] += weight * texel[channel];
-        weighted[channel] += weight * texel[3] * texel[channel];
+      for (size_t channel = 0; channel < 4; ++channel) plain[channel] += weight * texel[channel];
+      if constexpr (kWeighted) {
+        for (size_t channel = 0; channel < 3; ++channel)
+          weighted[channel] += weight * texel[3] * texel[channel];
       }
-      plain[3] += weight * texel[3];
     }
   }
-  if (alpha_weighted && plain[3] > 0) {
+  if (kWeighted && plain[3] > 0) {
     for (size_t channel = 0; channel < 3; ++channel) plain[channel] = weighted[channel] / plain[3];
   }
   for (float& channel : plain)
@@ -124,21 +124,64 @@ Texel Average(const Taps& across, const Taps& down, bool alpha_weighted, const S
 }
 
 /// Fills `target` and its words from `source(x, y)`.
-template <class Source>
-void Reduce(const Codec& codec, Size from, Size to, bool alpha_weighted, const Source& source,
-            Level& target, uint32_t* words) {
+template <bool kWeighted, class Codec, class Source>
+void Reduce(const Codec& codec, Size from, Size to, const Source& source, Texel* target,
+            uint32_t* words) {
   const std::vector<Taps> across = MakeTaps(from.width, to.width);
   const std::vector<Taps> down = MakeTaps(from.height, to.height);
-  target.resize(static_cast<size_t>(to.width) * static_cast<size_t>(to.height));
   tbb::parallel_for(tbb::blocked_range<size_t>(0, down.size(), 16), [&](const auto& rows) {
     for (size_t y = rows.begin(); y != rows.end(); ++y) {
       for (size_t x = 0; x < across.size(); ++x) {
         const size_t index = y * across.size() + x;
-        target[index] = Average(across[x], down[y], alpha_weighted, source);
-        codec.Write(target[index], words + index * codec.WordsPerTexel());
+        const Texel texel = Average<kWeighted>(across[x], down[y], source);
+        target[index] = texel;
+        codec.Write(texel, words + index * Codec::kWords);
       }
     }
   });
+}
+
+/// Room for a level; what it holds is not set.
+std::unique_ptr<Texel[]> MakeLevel(const Texture& texture, int level) {
+  const Size size = SizeOf(texture, level);
+  return std::make_unique_for_overwrite<Texel[]>(static_cast<size_t>(size.width) *
+                                                 static_cast<size_t>(size.height));
+}
+
+template <bool kWeighted, class Codec>
+void FillLevels(const Codec& codec, const Texture& texture, std::span<uint32_t> words) {
+  std::unique_ptr<Texel[]> above, below;
+  for (int level = 1; level < texture.levels; ++level) {
+    const Size from = SizeOf(texture, level - 1), to = SizeOf(texture, level);
+    uint32_t* const out = words.data() + texture.level_offset[level];
+    const auto row = static_cast<size_t>(from.width);
+    const auto index = [&](int x, int y) {
+      return static_cast<size_t>(y) * row + static_cast<size_t>(x);
+    };
+    if (level <= 2) below = MakeLevel(texture, level);  // later ones fit into these two
+    if (level == 1) {
+      const uint32_t* const top = words.data() + texture.level_offset[0];
+      const auto source = [&](int x, int y) {
+        return codec.Read(top + index(x, y) * Codec::kWords);
+      };
+      Reduce<kWeighted>(codec, from, to, source, below.get(), out);
+    } else {
+      const auto source = [&](int x, int y) { return above[index(x, y)]; };
+      Reduce<kWeighted>(codec, from, to, source, below.get(), out);
+    }
+    std::swap(above, below);
+  }
+}
+
+template <TexelFormat kFormat>
+void FillFormat(const Texture& texture, bool alpha_weighted, std::span<uint32_t> words) {
+  if (texture.srgb == 0) {  // data channels are independent
+    FillLevels<false>(Codec<kFormat, false>(), texture, words);
+  } else if (alpha_weighted) {
+    FillLevels<true>(Codec<kFormat, true>(), texture, words);
+  } else {
+    FillLevels<false>(Codec<kFormat, true>(), texture, words);
+  }
 }
 
 }  // namespace
@@ -154,31 +197,10 @@ int64_t LevelWords(const Texture& texture, int level) {
 }
 
 void FillMipLevels(const Texture& texture, bool alpha_weighted, std::span<uint32_t> words) {
-  const Codec codec(texture);
-  alpha_weighted = alpha_weighted && texture.srgb != 0;  // data channels are independent
-  Level above, below;
-  for (int level = 1; level < texture.levels; ++level) {
-    const Size from = SizeOf(texture, level - 1), to = SizeOf(texture, level);
-    uint32_t* const out = words.data() + texture.level_offset[level];
-    const auto row = static_cast<size_t>(from.width);
-    if (level == 1) {
-      const uint32_t* const top = words.data() + texture.level_offset[0];
-      Reduce(
-          codec, from, to, alpha_weighted,
-          [&](int x, int y) {
-            const size_t index = static_cast<size_t>(y) * row + static_cast<size_t>(x);
-            return codec.Read(top + index * codec.WordsPerTexel());
-          },
-          below, out);
-    } else {
-      Reduce(
-          codec, from, to, alpha_weighted,
-          [&](int x, int y) {
-            return above[static_cast<size_t>(y) * row + static_cast<size_t>(x)];
-          },
-          below, out);
-    }
-    std::swap(above, below);
+  if (texture.format == TexelFormat::rgba16) {
+    FillFormat<TexelFormat::rgba16>(texture, alpha_weighted, words);
+  } else {
+    FillFormat<TexelFormat::rgba8>(texture, alpha_weighted, words);
   }
 }
 

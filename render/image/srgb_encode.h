@@ -28,9 +28,8 @@ class Srgb8Encoder {
   uint8_t operator()(float linear) const {
     if (!(linear > 0)) return 0;
     if (linear >= 1) return 255;
-    uint8_t code = first_[static_cast<size_t>(linear * kBuckets)];
-    while (linear >= threshold_[code]) ++code;
-    return code;
+    const uint8_t code = first_[static_cast<size_t>(linear * kBuckets)];
+    return static_cast<uint8_t>(code + (linear >= threshold_[code] ? 1 : 0));
   }
 
   /// One table for the whole program.
@@ -40,7 +39,7 @@ class Srgb8Encoder {
   }
 
  private:
-  static constexpr float kBuckets = 4096;  // the steepest step is 1/3294: at most two per bucket
+  static constexpr float kBuckets = 4096;  // the steepest step is 1/3294: at most one begins in a bucket
   std::array<float, 256> threshold_{};     // from here on the next code is nearer
   std::array<uint8_t, 4096> first_{};      // the code at the beginning of each bucket
 };

@@ -104,7 +104,7 @@ void BuildTextures(std::span<const EncodedImageView> images,
                    std::span<const TextureSourceView> sources, stages::TextureTables& out,
                    const WarningSink& warn) {
   std::vector<ImageJob> jobs = CollectJobs(images, sources);
-  out.words.assign(static_cast<size_t>(LayOut(jobs, images)), 0);
+  out.words.resize(static_cast<size_t>(LayOut(jobs, images)));
   // The error of the first bad image, not of the first that happened to be decoded.
   std::vector<std::exception_ptr> errors(jobs.size());
   tbb::parallel_for(size_t{0}, jobs.size(), [&](size_t i) {

@@ -113,8 +113,9 @@ EnvironmentReport BuildEnvironment(stages::Environment& environment, int width, 
   built.width = width;
   built.height = height;
   built.texels.resize(4 * w * h);
-  const auto make = [](stages::HugeVector<int32_t>& table, size_t entries) {
-    table.resize(entries + stages::kTablePadding);
+  const auto make = [](stages::UnsetHugeVector<int32_t>& table, size_t entries) {
+    table.resize(entries);
+    table.resize(entries + stages::kTablePadding, 0);
   };
   make(built.row_cdf, h + 1);
   make(built.column_cdf, h * (w + 1));

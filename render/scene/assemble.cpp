@@ -1,9 +1,13 @@
 // The steps from an imported file to finished tables: textures, camera, placement, opacity, lights.
 #include "render/scene/assemble.h"
 
+#include <tbb/parallel_invoke.h>
+
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <utility>
 
 #include "render/image/environment_read.h"
@@ -81,21 +85,40 @@ bool HasOwnLight(const ImportedScene& imported, const SceneTables& tables) {
          std::any_of(tables.geometry.placements.begin(), tables.geometry.placements.end(), emits);
 }
 
-void MakeEnvironment(const ImportedScene& imported, const AssembleOptions& options,
-                     PreparedScene& scene) {
-  stages::Environment& environment = scene.tables.lights.environment;
-  if (!options.environment.empty()) {
-    EnvironmentMap image = ReadEnvironment(options.environment, options.warn);
-    BuildEnvironment(environment, image.width, image.height, std::move(image.rgb));
-    scene.environment_name = options.environment;
-  } else if (!HasOwnLight(imported, scene.tables)) {
-    constexpr int kRows = 16;
-    BuildEnvironment(environment, 1, kRows, NeutralSky(kRows));
-    scene.environment_name = "(neutral)";
-    if (options.warn) {
-      options.warn(imported.summary.file +
-                   ": the scene has no light; using a neutral sky (--env takes another)");
+void LoadEnvironment(const AssembleOptions& options, PreparedScene& scene) {
+  if (options.environment.empty()) return;
+  EnvironmentMap image = ReadEnvironment(options.environment, options.warn);
+  BuildEnvironment(scene.tables.lights.environment, image.width, image.height,
+                   std::move(image.rgb));
+  scene.environment_name = options.environment;
+}
+
+void LightTheUnlit(const ImportedScene& imported, const AssembleOptions& options,
+                   PreparedScene& scene) {
+  if (!options.environment.empty() || HasOwnLight(imported, scene.tables)) return;
+  constexpr int kRows = 16;
+  BuildEnvironment(scene.tables.lights.environment, 1, kRows, NeutralSky(kRows));
+  scene.environment_name = "(neutral)";
+  if (options.warn) {
+    options.warn(imported.summary.file +
+                 ": the scene has no light; using a neutral sky (--env takes another)");
+  }
+}
+
+/// Runs both at once. If both fail, the error is the first one's.
+template <class First, class Second>
+void RunBoth(const First& first, const Second& second) {
+  std::array<std::exception_ptr, 2> errors;
+  const auto attempt = [&](size_t which, const auto& action) {
+    try {
+      action();
+    } catch (...) {
+      errors[which] = std::current_exception();
     }
+  };
+  tbb::parallel_invoke([&] { attempt(0, first); }, [&] { attempt(1, second); });
+  for (const std::exception_ptr& error : errors) {
+    if (error) std::rethrow_exception(error);
   }
 }
 
@@ -131,7 +154,8 @@ PreparedScene AssembleScene(ImportedScene imported, const AssembleOptions& optio
 
   tables.materials = std::move(imported.materials);
   tables.textures.slots = std::move(imported.slots);
-  MakeTextures(imported, tables, options.warn);
+  RunBoth([&] { MakeTextures(imported, tables, options.warn); },
+          [&] { LoadEnvironment(options, scene); });
   SimplifyOpacity(tables.materials, tables.textures, imported.geometry);
   scene.times.textures = watch.Lap();
 
@@ -140,7 +164,7 @@ PreparedScene AssembleScene(ImportedScene imported, const AssembleOptions& optio
   scene.placement = PlaceInstances(tables, imported.summary.file);
   scene.times.geometry = watch.Lap();
 
-  MakeEnvironment(imported, options, scene);
+  LightTheUnlit(imported, options, scene);
   std::vector<PunctualInput> punctual;
   for (const PunctualLight& light : imported.lights)
     punctual.push_back(ToPunctual(light, tables.origin));

@@ -17,10 +17,11 @@ struct AssembleOptions {
                             // without light
   int width = 0, height = 0;  // 0: by the camera's aspect
   int default_width = 1280;
-  WarningSink warn;
+  WarningSink warn;  // may be called from several threads at once
 };
 
-/// Seconds that each step of loading took.
+/// Seconds that each step of loading took. An environment map is read beside the textures and
+/// counts there.
 struct LoadTimes {
   double import = 0, textures = 0, geometry = 0, lights = 0;
 };

@@ -92,21 +92,52 @@ class Placer {
   }
 
   PlacementPlan Run() {
+    Reserve();
     for (const MeshInstance& instance : g_.instances) {
       if (Vanishes(instance.object_to_world)) continue;
-      const bool singular = Determinant(instance.object_to_world) == 0;  // Embree cannot invert it
-      if (uses_[instance.mesh] == 1 || singular || Copied(instance.mesh)) {
+      if (IsFlat(instance)) {
         PlaceFlat(instance);
       } else {
         PlaceInstanced(instance);
       }
     }
-    Extend(g_.floats, 4);   // Embree and kernels load 16 bytes at a vertex, also at the last one
-    Extend(g_.indices, 1);  // kernels do so at a triangle
+    g_.floats.resize(g_.floats.size() + kFloatsBehind, 0.0f);
+    g_.indices.resize(g_.indices.size() + kIndicesBehind, 0);
     return plan_;
   }
 
  private:
+  // Embree and kernels load 16 bytes at a vertex, also at the last one; kernels do so at a
+  // triangle.
+  static constexpr size_t kFloatsBehind = 4, kIndicesBehind = 1;
+
+  // Room for all copies of streams at once: these tables are large, and each move touches new
+  // pages.
+  void Reserve() {
+    size_t floats = g_.floats.size() + kFloatsBehind;
+    size_t indices = g_.indices.size() + kIndicesBehind;
+    for (const MeshInstance& instance : g_.instances) {
+      if (Vanishes(instance.object_to_world) || !IsFlat(instance)) continue;
+      const Mesh& mesh = g_.meshes[instance.mesh];
+      for (int32_t s = 0; s < mesh.shape_count; ++s) {
+        const Shape& shape = g_.shapes[mesh.first_shape + s];
+        if (BakesInPlace(instance, shape)) continue;
+        const int width = 3 + (shape.normals != kNone ? 3 : 0) + (shape.tangents != kNone ? 4 : 0);
+        floats += static_cast<size_t>(width) * shape.vertex_count;
+        if (Determinant(instance.object_to_world) < 0) indices += size_t{3} * shape.triangle_count;
+      }
+    }
+    g_.floats.reserve(std::min(floats, kMostElements));
+    g_.indices.reserve(std::min(indices, kMostElements));
+  }
+
+  bool IsFlat(const MeshInstance& instance) const {
+    const bool singular = Determinant(instance.object_to_world) == 0;  // Embree cannot invert it
+    return uses_[instance.mesh] == 1 || singular || Copied(instance.mesh);
+  }
+  bool BakesInPlace(const MeshInstance& instance, const Shape& shape) const {
+    return uses_[instance.mesh] == 1 && OwnsStreams(shape);
+  }
   uint64_t Triangles(const Mesh& mesh) const {
     uint64_t count = 0;
     for (int32_t s = 0; s < mesh.shape_count; ++s)
@@ -141,7 +172,7 @@ class Placer {
 
   // Room for `count` more elements in a stream; its offset.
   template <class T>
-  int32_t Extend(stages::HugeVector<T>& stream, size_t count) {
+  int32_t Extend(stages::UnsetHugeVector<T>& stream, size_t count) {
     const size_t offset = stream.size();
     if (offset + count > kMostElements) {
       throw InputError(where_,
@@ -157,7 +188,7 @@ class Placer {
       const int32_t index = mesh.first_shape + s;
       const Shape shape = g_.shapes[index];
       Placement p = MakePlacement(shape, instance.object);
-      Bake(shape, instance.object_to_world, uses_[instance.mesh] == 1 && OwnsStreams(shape), p);
+      Bake(shape, instance.object_to_world, BakesInPlace(instance, shape), p);
       plan_.flat.push_back({static_cast<int32_t>(g_.placements.size()), index});
       plan_.flat_triangles += shape.triangle_count;
       g_.placements.push_back(p);

@@ -73,7 +73,7 @@ class Barriers final : public Executor {
   int lanes_;
   OpacityQuery opacity_;
   ExecutorOptions options_;
-  HugeVector<PathState> paths_;
+  UnsetHugeVector<PathState> paths_;
   std::vector<Step> step_;  // of each slot, written by the step before
   std::array<std::vector<uint32_t>, kSteps> lists_;
 

@@ -114,7 +114,7 @@ class Wavefront final : public Executor {
   uint32_t in_flight_;
   ShadeBins bins_;
   SlotPool pool_;
-  HugeVector<PathState> paths_;
+  UnsetHugeVector<PathState> paths_;
   std::vector<WorkerTally> tallies_;
   bool has_environment_ = false, has_shadow_ = false;
 

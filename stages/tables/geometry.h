@@ -68,8 +68,8 @@ struct Mesh {
 };
 
 struct GeometryTables {
-  HugeVector<float> floats;      // all vertex streams, at most 2^31 - 1 elements
-  HugeVector<uint32_t> indices;  // vertex numbers within the shape, at most 2^31 - 1 elements
+  UnsetHugeVector<float> floats;      // all vertex streams, at most 2^31 - 1 elements
+  UnsetHugeVector<uint32_t> indices;  // vertex numbers within the shape, at most 2^31 - 1 elements
   std::vector<Shape> shapes;
   std::vector<Mesh> meshes;
   std::vector<MeshInstance> instances;

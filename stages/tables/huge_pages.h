@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <new>
+#include <type_traits>
 #include <vector>
 
 namespace carpool::stages {
@@ -39,5 +40,22 @@ struct HugePageAllocator {
 
 template <class T>
 using HugeVector = std::vector<T, HugePageAllocator<T>>;
+
+/// The same for what is filled anyway: resize() leaves what it adds unset, so that a page is first
+/// touched, which makes the system clear it, by the thread that fills it.
+template <class T>
+struct UnsetHugePageAllocator : HugePageAllocator<T> {
+  static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_default_constructible_v<T>);
+  template <class U>
+  struct rebind {
+    using other = UnsetHugePageAllocator<U>;
+  };
+
+  void construct(T*) {}
+  void construct(T* at, const T& value) { *at = value; }
+};
+
+template <class T>
+using UnsetHugeVector = std::vector<T, UnsetHugePageAllocator<T>>;
 
 }  // namespace carpool::stages

@@ -74,12 +74,12 @@ struct Environment {
   int32_t height = 0;
   /// 4 floats a texel: RGB in cd/m2, finite and >= 0, then P(row) P(column | row), the probability
   /// that sampling selects this texel: > 0 wherever RGB is. At most 2^29 texels.
-  HugeVector<float> texels;
+  UnsetHugeVector<float> texels;
   /// Behind each of these are kTablePadding words more.
-  HugeVector<int32_t> row_cdf;       // height + 1: mass of the rows before each, and of all
-  HugeVector<int32_t> column_cdf;    // height * (width + 1): the same within each row
-  HugeVector<int32_t> row_guide;     // GuideSize(height)
-  HugeVector<int32_t> column_guide;  // height * GuideSize(width)
+  UnsetHugeVector<int32_t> row_cdf;       // height + 1: mass of the rows before each, and of all
+  UnsetHugeVector<int32_t> column_cdf;    // height * (width + 1): the same within each row
+  UnsetHugeVector<int32_t> row_guide;     // GuideSize(height)
+  UnsetHugeVector<int32_t> column_guide;  // height * GuideSize(width)
 };
 
 struct LightTables {

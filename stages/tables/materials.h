@@ -95,7 +95,7 @@ struct alignas(128) Texture {
 static_assert(sizeof(Texture) == 128);
 
 struct TextureTables {
-  HugeVector<uint32_t> words;  // all texels of all textures, at most 2^31 - 1 words (8 GiB)
+  UnsetHugeVector<uint32_t> words;  // all texels of all textures, at most 2^31 - 1 words (8 GiB)
   std::vector<Texture> textures;
   std::vector<TextureSlot> slots;
 };

@@ -17,7 +17,7 @@ using stages::Environment;
 using stages::kEnvironmentMass;
 
 /// Of entry `i` of table `which`, of tables with `count` entries each.
-int32_t Mass(const stages::HugeVector<int32_t>& cdf, size_t which, size_t count, size_t i) {
+int32_t Mass(const stages::UnsetHugeVector<int32_t>& cdf, size_t which, size_t count, size_t i) {
   const int32_t* const table = &cdf[which * (count + 1)];
   EXPECT_EQ(table[count], kEnvironmentMass);
   return table[i + 1] - table[i];
