@@ -1,73 +1,88 @@
 // Shapes and meshes: decode, deform, mend, add tangents, store; each distinct primitive once.
 #include "render/gltf/geometry.h"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <limits>
 
 #include "render/gltf/normals.h"
-#include "render/gltf/primitive.h"
 #include "render/gltf/tangents.h"
 
 namespace carpool::render::gltf {
 
 using stages::kNone;
 
+namespace {
+/// Positions that may wait for their tangents to be made in parallel; the limit on the scene's
+/// geometry does not see them yet.
+constexpr uint64_t kFloatsAtOnce = 3 << 20;
+}  // namespace
+
 int GeometryBuilder::AddMesh(int mesh, int skin, const Deform& deform) {
   const auto [found, is_new] = mesh_of_.try_emplace({mesh, skin, deform.weights}, kNone);
   if (!is_new) return found->second;
   const Json& primitives = document_.Items("meshes")[mesh]["primitives"];
-  stages::Mesh entry{static_cast<int32_t>(tables.shapes.size()), 0};
+  stages::Mesh entry{static_cast<int32_t>(tables_.shapes.size()), 0};
   for (size_t p = 0; p < primitives.size(); ++p) {
-    const bool has_material = primitives[p].contains("material");
-    const int material =
-        has_material ? primitives[p]["material"].get<int>() : materials_.DefaultMaterial();
-    bool drawn = true;
-    const stages::Shape shape = BuildShape(mesh, static_cast<int>(p), material, deform, drawn);
-    if (!drawn) continue;
-    Charge(sizeof shape);
-    tables.shapes.push_back(shape);
-    ++entry.shape_count;
+    if (AddShape(mesh, static_cast<int>(p), deform)) ++entry.shape_count;
   }
   if (entry.shape_count == 0) return kNone;
-  tables.meshes.push_back(entry);
-  return found->second = static_cast<int>(tables.meshes.size()) - 1;
+  tables_.meshes.push_back(entry);
+  return found->second = static_cast<int>(tables_.meshes.size()) - 1;
 }
 
 void GeometryBuilder::AddInstance(const stages::MeshInstance& instance) {
   Charge(sizeof instance);
-  tables.instances.push_back(instance);
+  tables_.instances.push_back(instance);
 }
 
-uint64_t GeometryBuilder::TriangleCount(int table_mesh) const {
-  const stages::Mesh& mesh = tables.meshes[table_mesh];
-  uint64_t count = 0;
-  for (int s = 0; s < mesh.shape_count; ++s)
-    count += tables.shapes[mesh.first_shape + s].triangle_count;
-  return count;
+stages::GeometryTables GeometryBuilder::Finish() {
+  StoreWaiting();
+  for (const auto& [shape, original] : copies_) {
+    const int32_t material = tables_.shapes[shape].material;
+    tables_.shapes[shape] = tables_.shapes[original];
+    tables_.shapes[shape].material = material;
+  }
+  return std::move(tables_);
 }
 
-stages::Shape GeometryBuilder::BuildShape(int mesh, int index, int material, const Deform& deform,
-                                          bool& drawn) {
+/// Appends a shape, whose streams follow when it is stored; false where there is nothing to draw.
+bool GeometryBuilder::AddShape(int mesh, int index, const Deform& deform) {
   const Json& json = document_.Items("meshes")[mesh]["primitives"][index];
+  const int material =
+      json.contains("material") ? json["material"].get<int>() : materials_.DefaultMaterial();
+  const auto shape = static_cast<int32_t>(tables_.shapes.size());
   const std::vector<int> key = StreamKey(json, material);
   if (const auto found = shape_of_.find(key); deform.empty() && found != shape_of_.end()) {
-    stages::Shape shape = found->second;
-    shape.material = material;
-    return shape;
+    copies_.emplace_back(shape, found->second);
+  } else {
+    std::optional<Primitive> primitive =
+        DecodePrimitive(document_, mesh, index, materials_.needs[material]);
+    if (!primitive) return false;
+    ApplyDeform(document_, mesh, index, deform, *primitive);
+    MendNormals(document_, *primitive);
+    if (deform.empty()) shape_of_.emplace(key, shape);
+    waiting_floats_ += primitive->positions.size();
+    waiting_.push_back({shape, std::move(*primitive)});
   }
-  std::optional<Primitive> primitive =
-      DecodePrimitive(document_, mesh, index, materials_.needs[material]);
-  drawn = primitive.has_value();
-  if (!drawn) return {};
-  ApplyDeform(document_, mesh, index, deform, *primitive);
-  MendNormals(document_, *primitive);
-  AddTangents(*primitive, material);
-  stages::Shape shape = StoreShape(*primitive);
-  shape.material = material;
-  if (deform.empty()) shape_of_.emplace(key, shape);
-  return shape;
+  Charge(sizeof(stages::Shape));
+  tables_.shapes.emplace_back().material = material;
+  if (waiting_floats_ > kFloatsAtOnce) StoreWaiting();
+  return true;
 }
 
-void GeometryBuilder::AddTangents(Primitive& primitive, int material) {
+void GeometryBuilder::StoreWaiting() {
+  tbb::parallel_for(size_t{0}, waiting_.size(), [&](size_t i) {
+    AddTangents(waiting_[i].primitive, tables_.shapes[waiting_[i].shape].material);
+  });
+  for (const Waiting& waiting : waiting_)
+    StoreStreams(waiting.primitive, tables_.shapes[waiting.shape]);
+  waiting_.clear();
+  waiting_floats_ = 0;
+}
+
+void GeometryBuilder::AddTangents(Primitive& primitive, int material) const {
   if (!materials_.needs[material].tangents || !primitive.tangents.empty()) return;
   // Tangents follow normals. A flat mesh has one normal per triangle, so its vertices part; the
   // stream of normals is dropped again, because the kernels make flat normals themselves.
@@ -78,19 +93,18 @@ void GeometryBuilder::AddTangents(Primitive& primitive, int material) {
   if (flat) primitive.normals.clear();
 }
 
-stages::Shape GeometryBuilder::StoreShape(const Primitive& primitive) {
+void GeometryBuilder::StoreStreams(const Primitive& primitive, stages::Shape& shape) {
   constexpr size_t kMost = std::numeric_limits<int32_t>::max();
   const size_t floats = primitive.positions.size() + primitive.normals.size() +
                         primitive.tangents.size() + primitive.uvs.size() + primitive.colors.size();
-  if (tables.floats.size() + floats > kMost ||
-      tables.indices.size() + primitive.indices.size() > kMost) {
+  if (tables_.floats.size() + floats > kMost ||
+      tables_.indices.size() + primitive.indices.size() > kMost) {
     document_.Fail(primitive.pointer,
                    "the scene has more vertices than 32-bit offsets can number; "
                    "instance its meshes or split it");
   }
   Charge((floats + primitive.indices.size()) * 4);
-  stages::Shape shape;
-  shape.first_index = static_cast<int32_t>(tables.indices.size());
+  shape.first_index = static_cast<int32_t>(tables_.indices.size());
   shape.triangle_count = static_cast<int32_t>(primitive.indices.size() / 3);
   shape.vertex_count = static_cast<int32_t>(primitive.vertex_count());
   shape.positions = StoreFloats(primitive.positions);
@@ -99,14 +113,13 @@ stages::Shape GeometryBuilder::StoreShape(const Primitive& primitive) {
   shape.uvs = StoreFloats(primitive.uvs);
   shape.uv_sets = shape.uvs == kNone ? 0 : primitive.uv_sets;
   shape.colors = StoreFloats(primitive.colors);
-  tables.indices.insert(tables.indices.end(), primitive.indices.begin(), primitive.indices.end());
-  return shape;
+  tables_.indices.insert(tables_.indices.end(), primitive.indices.begin(), primitive.indices.end());
 }
 
 int GeometryBuilder::StoreFloats(const std::vector<float>& values) {
   if (values.empty()) return kNone;
-  const int offset = static_cast<int>(tables.floats.size());
-  tables.floats.insert(tables.floats.end(), values.begin(), values.end());
+  const int offset = static_cast<int>(tables_.floats.size());
+  tables_.floats.insert(tables_.floats.end(), values.begin(), values.end());
   return offset;
 }
 

@@ -4,11 +4,13 @@
 #include <map>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "render/gltf/deform.h"
 #include "render/gltf/document.h"
 #include "render/gltf/materials.h"
+#include "render/gltf/primitive.h"
 
 namespace carpool::render::gltf {
 
@@ -21,23 +23,30 @@ class GeometryBuilder {
                   const std::vector<stages::TextureSlot>& slots)
       : document_(document), materials_(materials), slots_(slots) {}
 
-  /// AddMesh() is the index in `tables.meshes` of a mesh as `deform` bends it, or kNone where it
-  /// has no triangles. `skin` (or kNone) stands for `deform.joints` when meshes are compared.
+  /// AddMesh() is the index of a mesh as `deform` bends it in the tables that Finish() gives, or
+  /// kNone where it has no triangles. `skin` (or kNone) stands for `deform.joints` when meshes are
+  /// compared.
   int AddMesh(int mesh, int skin, const Deform& deform);
 
   void AddInstance(const stages::MeshInstance& instance);
-  uint64_t TriangleCount(int table_mesh) const;
 
-  stages::GeometryTables tables;
+  /// Finish() hands over all that was added; the builder is of no use after it.
+  stages::GeometryTables Finish();
 
  private:
   using MeshKey = std::tuple<int, int, std::vector<double>>;
 
-  stages::Shape BuildShape(int mesh, int primitive, int material, const Deform& deform,
-                           bool& drawn);
-  stages::Shape StoreShape(const Primitive& primitive);
+  /// A shape whose streams are still to be stored: tangents of many are made in parallel.
+  struct Waiting {
+    int32_t shape;
+    Primitive primitive;
+  };
+
+  bool AddShape(int mesh, int primitive, const Deform& deform);
+  void StoreWaiting();
+  void StoreStreams(const Primitive& primitive, stages::Shape& shape);
   int StoreFloats(const std::vector<float>& values);
-  void AddTangents(Primitive& primitive, int material);
+  void AddTangents(Primitive& primitive, int material) const;
   std::vector<int> StreamKey(const Json& primitive, int material) const;
   void Charge(uint64_t bytes);
 
@@ -45,7 +54,12 @@ class GeometryBuilder {
   MaterialTable& materials_;
   const std::vector<stages::TextureSlot>& slots_;
   std::map<MeshKey, int> mesh_of_;
-  std::map<std::vector<int>, stages::Shape> shape_of_;
+  stages::GeometryTables tables_;
+  std::map<std::vector<int>, int32_t> shape_of_;  // the first shape with these streams
+  std::vector<std::pair<int32_t, int32_t>>
+      copies_;  // shapes, each with the one whose streams it has
+  std::vector<Waiting> waiting_;
+  uint64_t waiting_floats_ = 0;  // positions of those
   uint64_t bytes_ = 0;
 };
 

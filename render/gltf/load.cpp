@@ -19,10 +19,12 @@ void WarnOfMotion(Document& document) {
   }
 }
 
-uint64_t CountDrawn(const GeometryBuilder& geometry) {
+uint64_t CountDrawn(const stages::GeometryTables& geometry) {
   uint64_t triangles = 0;
-  for (const stages::MeshInstance& instance : geometry.tables.instances) {
-    triangles += geometry.TriangleCount(instance.mesh);
+  for (const stages::MeshInstance& instance : geometry.instances) {
+    const stages::Mesh& mesh = geometry.meshes[instance.mesh];
+    for (int s = 0; s < mesh.shape_count; ++s)
+      triangles += geometry.shapes[mesh.first_shape + s].triangle_count;
   }
   return triangles;
 }
@@ -37,16 +39,16 @@ ImportedScene Import(const std::filesystem::path& path, const LoadOptions& optio
   WarnOfMotion(document);
 
   ImportedScene scene;
+  scene.geometry = geometry.Finish();
   scene.cameras = ReadCameras(document, tree);
   scene.lights = ReadLights(document, tree);
   scene.images = LoadImages(document, textures.image_used());
   scene.summary = Summarize(document);
   scene.summary.scene = tree.scene;
-  scene.summary.triangles_drawn = CountDrawn(geometry);
+  scene.summary.triangles_drawn = CountDrawn(scene.geometry);
   scene.summary.file_bytes = document.budget.read;
   for (const Json& node : document.Items("nodes"))
     scene.node_names.push_back(Get<std::string>(node, "name", ""));
-  scene.geometry = std::move(geometry.tables);
   scene.materials = std::move(materials.materials);
   scene.material_names = std::move(materials.names);
   scene.slots = std::move(textures.slots);

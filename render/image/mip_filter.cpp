@@ -49,6 +49,13 @@ std::vector<Taps> MakeTaps(int source, int target) {
   return taps;
 }
 
+/// What each byte is as a share of the largest: a look-up costs less than a division.
+constexpr std::array<float, 256> kByteShares = [] {
+  std::array<float, 256> shares{};
+  for (size_t code = 0; code < shares.size(); ++code) shares[code] = static_cast<float>(code) / 255;
+  return shares;
+}();
+
 /// Texels of one kind of texture between words and linear light. The kind is a template's matter
 /// because all of this is done for each texel of a scene while somebody waits.
 template <TexelFormat kFormat, bool kSrgb>
@@ -61,8 +68,7 @@ class Codec {
     for (size_t channel = 0; channel < 4; ++channel) {
       const uint32_t code = kWords == 2 ? word[channel / 2] >> (16 * (channel % 2)) & 0xffff
                                         : word[0] >> (8 * channel) & 0xff;
-      texel[channel] = kSrgb && channel < 3 ? table_[code]
-                                            : static_cast<float>(code) / static_cast<float>(kMost);
+      texel[channel] = kSrgb && channel < 3 ? table_[code] : Share(code);
     }
     return texel;
   }
@@ -86,6 +92,10 @@ class Codec {
   static const float* Table() {
     return kWords == 2 ? stages::SrgbDecode16().data() : stages::SrgbDecode8().data();
   }
+  static float Share(uint32_t code) {
+    if constexpr (kWords == 2) return static_cast<float>(code) / 65535;
+    return kByteShares[code];
+  }
   static uint32_t Round(double share) {
     return static_cast<uint32_t>(static_cast<int32_t>(share * kMost + 0.5));
   }
@@ -99,12 +109,12 @@ class Codec {
 };
 
 /// Averages the source texels under two taps; `source(x, y)` gives one. With kWeighted, colours
-/// count by their alpha.
-template <bool kWeighted, class Source>
+/// count by their alpha; with kPairs, there are two by two.
+template <bool kWeighted, bool kPairs, class Source>
 Texel Average(const Taps& across, const Taps& down, const Source& source) {
   Texel plain{}, weighted{};
-  for (int j = 0; j < down.count; ++j) {
-    for (int i = 0; i < across.count; ++i) {
+  for (int j = 0; j < (kPairs ? 2 : down.count); ++j) {
+    for (int i = 0; i < (kPairs ? 2 : across.count); ++i) {
       const Texel texel = source(across.first + i, down.first + j);
       const float weight =
           across.weight[static_cast<size_t>(i)] * down.weight[static_cast<size_t>(j)];
@@ -124,21 +134,31 @@ Texel Average(const Taps& across, const Taps& down, const Source& source) {
 }
 
 /// Fills `target` and its words from `source(x, y)`.
-template <bool kWeighted, class Codec, class Source>
-void Reduce(const Codec& codec, Size from, Size to, const Source& source, Texel* target,
-            uint32_t* words) {
-  const std::vector<Taps> across = MakeTaps(from.width, to.width);
-  const std::vector<Taps> down = MakeTaps(from.height, to.height);
+template <bool kWeighted, bool kPairs, class Codec, class Source>
+void Reduce(const Codec& codec, const std::vector<Taps>& across, const std::vector<Taps>& down,
+            const Source& source, Texel* target, uint32_t* words) {
   tbb::parallel_for(tbb::blocked_range<size_t>(0, down.size(), 16), [&](const auto& rows) {
     for (size_t y = rows.begin(); y != rows.end(); ++y) {
       for (size_t x = 0; x < across.size(); ++x) {
         const size_t index = y * across.size() + x;
-        const Texel texel = Average<kWeighted>(across[x], down[y], source);
+        const Texel texel = Average<kWeighted, kPairs>(across[x], down[y], source);
         target[index] = texel;
         codec.Write(texel, words + index * Codec::kWords);
       }
     }
   });
+}
+
+template <bool kWeighted, class Codec, class Source>
+void Reduce(const Codec& codec, Size from, Size to, const Source& source, Texel* target,
+            uint32_t* words) {
+  const std::vector<Taps> across = MakeTaps(from.width, to.width);
+  const std::vector<Taps> down = MakeTaps(from.height, to.height);
+  if (across[0].count == 2 && down[0].count == 2) {
+    Reduce<kWeighted, true>(codec, across, down, source, target, words);
+  } else {
+    Reduce<kWeighted, false>(codec, across, down, source, target, words);
+  }
 }
 
 /// Room for a level; what it holds is not set.
