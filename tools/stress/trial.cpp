@@ -2,8 +2,6 @@
 #include "trial.h"
 
 #include <algorithm>
-#include <ctime>
-#include <limits>
 #include <thread>
 #include <utility>
 
@@ -11,6 +9,7 @@
 #include <tbb/task_arena.h>
 
 #include "allocations.h"
+#include "idle_cost.h"
 #include "random_settings.h"
 
 namespace carpool_stress {
@@ -19,20 +18,12 @@ namespace {
 using carpool_test::RandomGraph;
 using std::chrono::steady_clock;
 
+constexpr double kIdleLimit = 0.05;  // of a core
+
 // The only exception that a trial throws into a run.
 struct Thrown {
   std::uint64_t seed;
 };
-
-double seconds_since(steady_clock::time_point begin) {
-  return std::chrono::duration<double>(steady_clock::now() - begin).count();
-}
-
-double process_cpu_seconds() {
-  std::timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 // One line: what it was, and the command that repeats it; again and again on threads, where an
 // interleaving cannot be repeated at will.
@@ -170,20 +161,18 @@ void Trial::keep_company() {
 }
 
 // This worker has work and sleeps; the others find none. Once they have left, the whole process
-// should use no time. Other threads of oneTBB look around for a while before they sleep, so the
-// best of many short looks counts: one who spins would show in all of them.
+// should use no time.
 void Trial::measure_idleness() {
   for (auto state = monitor_.look(); state && (state->active > 1 || state->invited > 0);
        state = monitor_.look()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  findings_.idle_cpu_share = std::numeric_limits<double>::infinity();
-  for (int look = 0; look < 50 && findings_.idle_cpu_share > 0.01; ++look) {
-    const steady_clock::time_point begin = steady_clock::now();
-    const double cpu = process_cpu_seconds();
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    findings_.idle_cpu_share =
-        std::min(findings_.idle_cpu_share, (process_cpu_seconds() - cpu) / seconds_since(begin));
+  findings_.idle_cpu_share = least_cpu_share(kIdleLimit);
+  if (findings_.idle_cpu_share <= kIdleLimit) return;
+  busy_ = busy_threads();
+  if (const auto state = monitor_.look()) {
+    busy_ += "; " + std::to_string(state->active) + " workers active, " +
+             std::to_string(state->invited) + " invited";
   }
 }
 
@@ -278,7 +267,10 @@ void Trial::check() {
   // Each worker may have begun one call since it last looked, and looks after that.
   require(late_batches_ <= carpool::worker_count(random_.graph(), options_),
           "more than one call per worker began after a cancel");
-  require(findings_.idle_cpu_share <= 0.05, "workers without work used more than 5 % of a core");
+  if (findings_.idle_cpu_share > kIdleLimit) {
+    fail("workers without work used " + std::to_string(findings_.idle_cpu_share) +
+         " cores: " + busy_);
+  }
 }
 
 void Trial::check_exception() const {

@@ -83,6 +83,7 @@ class Trial {
   std::exception_ptr exception_;
   std::size_t measured_bytes_ = 0;
   Findings findings_;
+  std::string busy_;  // who was at work when nobody should have been
 };
 
 // TrialRunner runs trials and keeps the last ones for a while: a call that comes much too late is
