@@ -56,10 +56,10 @@ class GeometryBuilder {
   std::map<MeshKey, int> mesh_of_;
   stages::GeometryTables tables_;
   std::map<std::vector<int>, int32_t> shape_of_;  // the first shape with these streams
-  std::vector<std::pair<int32_t, int32_t>>
-      copies_;  // shapes, each with the one whose streams it has
+  // Shapes, each with the one whose streams it shows.
+  std::vector<std::pair<int32_t, int32_t>> copies_;
   std::vector<Waiting> waiting_;
-  uint64_t waiting_floats_ = 0;  // positions of those
+  uint64_t waiting_floats_ = 0;  // in their positions
   uint64_t bytes_ = 0;
 };
 

@@ -39,9 +39,10 @@ class Srgb8Encoder {
   }
 
  private:
-  static constexpr float kBuckets = 4096;  // the steepest step is 1/3294: at most one begins in a bucket
-  std::array<float, 256> threshold_{};     // from here on the next code is nearer
-  std::array<uint8_t, 4096> first_{};      // the code at the beginning of each bucket
+  // The steepest step is 1/3294: at most one begins in a bucket.
+  static constexpr float kBuckets = 4096;
+  std::array<float, 256> threshold_{};  // from here on the next code is nearer
+  std::array<uint8_t, 4096> first_{};   // the code at the beginning of each bucket
 };
 
 }  // namespace carpool::render

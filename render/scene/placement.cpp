@@ -127,8 +127,12 @@ class Placer {
         if (Determinant(instance.object_to_world) < 0) indices += size_t{3} * shape.triangle_count;
       }
     }
-    g_.floats.reserve(std::min(floats, kMostElements));
-    g_.indices.reserve(std::min(indices, kMostElements));
+    if (floats > kMostElements || indices > kMostElements) {
+      throw InputError(where_,
+                       "the scene has more than 2^31 vertex values; split it or use fewer copies");
+    }
+    g_.floats.reserve(floats);
+    g_.indices.reserve(indices);
   }
 
   bool IsFlat(const MeshInstance& instance) const {
@@ -174,10 +178,6 @@ class Placer {
   template <class T>
   int32_t Extend(stages::UnsetHugeVector<T>& stream, size_t count) {
     const size_t offset = stream.size();
-    if (offset + count > kMostElements) {
-      throw InputError(where_,
-                       "the scene has more than 2^31 vertex values; split it or use fewer copies");
-    }
     stream.resize(offset + count);
     return static_cast<int32_t>(offset);
   }

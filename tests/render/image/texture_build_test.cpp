@@ -51,6 +51,22 @@ TEST(BuildTextures, LaysOutAllChainsWithoutOverlap) {
   EXPECT_EQ(offsets.size(), 5u);
 }
 
+// The pool is not cleared before it is filled.
+TEST(BuildTextures, FillsEveryWord) {
+  const Bytes rgba8 = MakeRgbaPng(3, 2, kTexels);
+  const Bytes rgba16 =
+      MakePng({1, 1, 16, 2, false, {}, {}, -1, {0x12, 0x34, 0x56, 0x78, 0x9a, 0xbc}});
+  const std::array<EncodedImageView, 2> images = {{{rgba8, "a.png"}, {rgba16, "b.png"}}};
+  const std::array<TextureSourceView, 3> sources = {{{1, false}, {0, true}, {0, false}}};
+  const auto build = [&](uint32_t before) {
+    TextureTables tables;
+    tables.words.assign(1000, before);
+    BuildTextures(images, sources, tables, {});
+    return tables.words;
+  };
+  EXPECT_EQ(build(0), build(0xdeadbeefu));
+}
+
 TEST(BuildTextures, EqualSourcesShareTheirTexels) {
   const Bytes png = MakeRgbaPng(3, 2, kTexels);
   const std::array<EncodedImageView, 1> images = {{{png, "a.png"}}};
