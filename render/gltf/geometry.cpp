@@ -13,9 +13,14 @@ namespace carpool::render::gltf {
 using stages::kNone;
 
 namespace {
-/// Positions that may wait for their tangents to be made in parallel; the limit on the scene's
-/// geometry does not see them yet.
-constexpr uint64_t kFloatsAtOnce = 3 << 20;
+/// Numbers that may wait for tangents to be made in parallel; the limit on the scene's geometry
+/// does not see them yet.
+constexpr uint64_t kNumbersAtOnce = 8 << 20;
+
+/// In all streams of a primitive.
+uint64_t FloatsOf(const Primitive& p) {
+  return p.positions.size() + p.normals.size() + p.tangents.size() + p.uvs.size() + p.colors.size();
+}
 }  // namespace
 
 int GeometryBuilder::AddMesh(int mesh, int skin, const Deform& deform) {
@@ -62,12 +67,12 @@ bool GeometryBuilder::AddShape(int mesh, int index, const Deform& deform) {
     ApplyDeform(document_, mesh, index, deform, *primitive);
     MendNormals(document_, *primitive);
     if (deform.empty()) shape_of_.emplace(key, shape);
-    waiting_floats_ += primitive->positions.size();
+    waiting_numbers_ += FloatsOf(*primitive) + primitive->indices.size();
     waiting_.push_back({shape, std::move(*primitive)});
   }
   Charge(sizeof(stages::Shape));
   tables_.shapes.emplace_back().material = material;
-  if (waiting_floats_ > kFloatsAtOnce) StoreWaiting();
+  if (waiting_numbers_ > kNumbersAtOnce) StoreWaiting();
   return true;
 }
 
@@ -78,7 +83,7 @@ void GeometryBuilder::StoreWaiting() {
   for (const Waiting& waiting : waiting_)
     StoreStreams(waiting.primitive, tables_.shapes[waiting.shape]);
   waiting_.clear();
-  waiting_floats_ = 0;
+  waiting_numbers_ = 0;
 }
 
 void GeometryBuilder::AddTangents(Primitive& primitive, int material) const {
@@ -94,8 +99,7 @@ void GeometryBuilder::AddTangents(Primitive& primitive, int material) const {
 
 void GeometryBuilder::StoreStreams(const Primitive& primitive, stages::Shape& shape) {
   constexpr size_t kMost = std::numeric_limits<int32_t>::max();
-  const size_t floats = primitive.positions.size() + primitive.normals.size() +
-                        primitive.tangents.size() + primitive.uvs.size() + primitive.colors.size();
+  const uint64_t floats = FloatsOf(primitive);
   if (tables_.floats.size() + floats > kMost ||
       tables_.indices.size() + primitive.indices.size() > kMost) {
     document_.Fail(primitive.pointer,

@@ -59,7 +59,7 @@ class GeometryBuilder {
   // Shapes, each with the one whose streams it shows.
   std::vector<std::pair<int32_t, int32_t>> copies_;
   std::vector<Waiting> waiting_;
-  uint64_t waiting_floats_ = 0;  // in their positions
+  uint64_t waiting_numbers_ = 0;  // floats and indices of those
   uint64_t bytes_ = 0;
 };
 
