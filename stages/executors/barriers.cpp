@@ -126,7 +126,7 @@ void Barriers::Start(CameraWork& work) {
   lists_[kIdle].clear();
   std::vector<CameraPacket> packets;
   while (more_packets_ && (packets.size() + 1) * 8 <= idle.size()) {
-    more_packets_ = work.Claim(1, [&](const CameraPacket& p) { packets.push_back(p); });
+    more_packets_ = work.Claim(0, 1, [&](const CameraPacket& p) { packets.push_back(p); });
   }
   for (size_t i = packets.size() * 8; i < idle.size(); ++i) step_[idle[i]] = kIdle;
   tbb::parallel_for(size_t{0}, packets.size(), [&](size_t p) {

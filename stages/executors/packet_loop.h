@@ -20,27 +20,27 @@ PassReport RunPackets(const KernelContext& c, const ExecutorOptions& options,
                       const CameraPass& pass, const std::atomic<bool>& stop,
                       const std::function<void(double)>& progress, Visit visit, Gather gather) {
   const auto begin = std::chrono::steady_clock::now();
-  CameraWork work(c.width, c.height, pass);
+  CameraWork work(c.width, c.height, pass, options.threads);
   tbb::enumerable_thread_specific<Tally> tallies;
   std::atomic<bool> reporting{false};
   BusyClock clock(options.threads);
 
-  // Each body keeps claiming the groups of one tile at one sample until none is left: dynamic
-  // balance, no barrier.
-  const auto worker = [&](size_t) {
+  // Each body keeps claiming some samples of a tile until none is left: dynamic balance, no
+  // barrier.
+  const auto worker = [&](uint32_t index) {
     const FlushDenormals denormals;
     const BusyClock::Scope busy(clock);
     Tally& tally = tallies.local();
     bool more = true;
     while (more && !stop.load(std::memory_order_relaxed)) {
-      more = work.Claim(kClaim, [&](const CameraPacket& p) { visit(p, tally); });
+      more = work.Claim(index, kClaim, [&](const CameraPacket& p) { visit(p, tally); });
       if (progress && !reporting.exchange(true, std::memory_order_acquire)) {
         progress(work.Fraction());
         reporting.store(false, std::memory_order_release);
       }
     }
   };
-  options.arena->execute([&] { tbb::parallel_for(size_t{0}, size_t{options.threads}, worker); });
+  options.arena->execute([&] { tbb::parallel_for(uint32_t{0}, options.threads, worker); });
 
   PassReport report;
   for (const Tally& tally : tallies) gather(tally, report);

@@ -86,7 +86,7 @@ PassReport Recursive::Render(const CameraPass& pass, const std::atomic<bool>& st
   const auto begin = std::chrono::steady_clock::now();
   std::vector<CameraPacket> packets;
   CameraWork all(c_.width, c_.height, pass);
-  while (all.Claim(kGroupsPerTile, [&](const CameraPacket& p) { packets.push_back(p); })) {
+  while (all.Claim(0, kGroupsPerTile, [&](const CameraPacket& p) { packets.push_back(p); })) {
   }
   if (grain_ == Grain::pixel) {  // all samples of a group of pixels are one piece of work
     std::stable_sort(packets.begin(), packets.end(), [](const auto& a, const auto& b) {

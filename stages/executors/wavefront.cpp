@@ -184,8 +184,8 @@ void Wavefront::BuildGraph() {
 
 SourceStatus Wavefront::ClaimPackets(SourceContext& source, Emitter& out) {
   if (stop_->load(std::memory_order_relaxed)) return SourceStatus::exhausted;
-  const bool more =
-      work_->Claim(source.budget, [&](const CameraPacket& p) { out.emit(camera_, 0, p); });
+  const bool more = work_->Claim(source.worker, source.budget,
+                                 [&](const CameraPacket& p) { out.emit(camera_, 0, p); });
   return more ? SourceStatus::more : SourceStatus::exhausted;
 }
 
@@ -294,7 +294,7 @@ void Wavefront::FilmKernel(const Batch<Slot>& batch) {
 
 PassReport Wavefront::Render(const CameraPass& pass, const std::atomic<bool>& stop,
                              const std::function<void(double)>& progress) {
-  CameraWork work(c_.width, c_.height, pass);
+  CameraWork work(c_.width, c_.height, pass, options_.threads);
   work_ = &work;
   stop_ = &stop;
   for (WorkerTally& tally : tallies_) tally.rays = {};

@@ -2,12 +2,14 @@
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
+#include <atomic>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <set>
 #include <span>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "stages/executors/binning.h"
@@ -23,7 +25,7 @@ using Key = std::tuple<uint32_t, uint32_t, uint32_t>;
 std::map<Key, int> Visits(uint32_t width, uint32_t height, const CameraPass& pass, uint32_t chunk) {
   CameraWork work(width, height, pass);
   std::map<Key, int> visits;
-  while (work.Claim(chunk, [&](const CameraPacket& p) { ++visits[{p.x, p.y, p.sample}]; })) {
+  while (work.Claim(0, chunk, [&](const CameraPacket& p) { ++visits[{p.x, p.y, p.sample}]; })) {
   }
   EXPECT_EQ(work.Fraction(), 1);
   return visits;
@@ -52,6 +54,73 @@ TEST(CameraWork, PhasesPartitionThePass) {
   }
   EXPECT_EQ(all.size(), 16u * 32);
   for (const auto& [key, count] : all) EXPECT_EQ(count, 1);
+}
+
+using Tile = std::pair<uint32_t, uint32_t>;
+Tile TileOf(const CameraPacket& p) {
+  return {p.x / kTileSize, p.y / kTileSize};
+}
+
+TEST(CameraWork, WorkersKeepToTilesOfTheirOwn) {
+  constexpr uint32_t kWorkers = 3, kSamples = 8;
+  CameraWork work(160, 80, {.sample_count = kSamples}, kWorkers);
+  std::map<Tile, std::set<uint32_t>> workers;
+  for (uint32_t turn = 0; turn < 3 * kSamples; ++turn) {
+    work.Claim(turn % kWorkers, kGroupsPerTile,
+               [&](const CameraPacket& p) { workers[TileOf(p)].insert(turn % kWorkers); });
+  }
+  EXPECT_EQ(workers.size(), 3u);  // each has had all samples of one
+  for (const auto& [tile, by] : workers) EXPECT_EQ(by.size(), 1u);
+}
+
+TEST(CameraWork, HelpsWithTheLastTiles) {
+  CameraWork work(16, 16, {.sample_count = 4}, 2);
+  std::set<uint32_t> first, second;
+  EXPECT_TRUE(work.Claim(0, kGroupsPerTile, [&](const auto& p) { first.insert(p.sample); }));
+  EXPECT_FALSE(
+      work.Claim(1, 100 * kGroupsPerTile, [&](const auto& p) { second.insert(p.sample); }));
+  EXPECT_EQ(first, (std::set<uint32_t>{0}));
+  EXPECT_EQ(second, (std::set<uint32_t>{1, 2, 3}));
+  EXPECT_EQ(work.Fraction(), 1);
+  EXPECT_FALSE(work.Claim(0, 1, [](const auto&) { ADD_FAILURE(); }));
+}
+
+TEST(CameraWork, WorkersTogetherCoverEverythingOnce) {
+  constexpr uint32_t kWorkers = 4, kWidth = 200, kHeight = 100, kSamples = 5;
+  for (int round = 0; round < 20; ++round) {
+    CameraWork work(kWidth, kHeight, {.sample_count = kSamples}, kWorkers);
+    std::vector<std::atomic<int>> visits(kWidth / 4 * (kHeight / 2) * kSamples);
+    tbb::parallel_for(
+        uint32_t{0}, kWorkers,
+        [&](uint32_t worker) {
+          while (work.Claim(worker, 1 + worker * 5, [&](const CameraPacket& p) {
+            ++visits[((p.y / 2) * (kWidth / 4) + p.x / 4) * kSamples + p.sample];
+          })) {
+          }
+        },
+        tbb::simple_partitioner());
+    EXPECT_EQ(work.Fraction(), 1);
+    for (const auto& count : visits) ASSERT_EQ(count, 1);
+  }
+}
+
+TEST(SlotPool, KeepsWorkersToTheirRanges) {
+  SlotPool pool(40000, 4);
+  std::vector<uint32_t> slots[4];
+  for (uint32_t worker = 0; worker < 4; ++worker) {
+    slots[worker].resize(5000);
+    pool.Take(worker, slots[worker]);
+  }
+  pool.Give(0, slots[3]);  // as after a theft
+  pool.Give(3, slots[0]);
+  const uint32_t range = pool.capacity() / 4;
+  for (uint32_t worker = 0; worker < 4; ++worker) {
+    size_t foreign = 0;
+    std::vector<uint32_t> again(5000);
+    pool.Take(worker, again);
+    for (const uint32_t slot : again) foreign += slot / range != worker ? 1 : 0;
+    EXPECT_LE(foreign, 1024u);  // what it has at hand
+  }
 }
 
 TEST(SlotPool, NeverHandsOutASlotTwiceAndNeverRunsDry) {

@@ -47,8 +47,8 @@ class FloatFilm {
 /// Nanoseconds of one thread per sample; the values differ from sample to sample, as radiance does.
 template <class Film>
 double TimeAdding(Film& film, uint32_t width, uint32_t height, tbb::task_arena& arena) {
-  CameraWork work(width, height, {.sample_count = kSamples});
-  const int threads = arena.max_concurrency();
+  const auto threads = static_cast<uint32_t>(arena.max_concurrency());
+  CameraWork work(width, height, {.sample_count = kSamples}, threads);
   const auto add = [&](const CameraPacket& packet) {
     for (uint32_t i = 0; i < 8; ++i) {
       const uint32_t x = packet.x + i % stages::kGroupWidth, y = packet.y + i / stages::kGroupWidth;
@@ -60,8 +60,8 @@ double TimeAdding(Film& film, uint32_t width, uint32_t height, tbb::task_arena& 
   };
   const auto begin = std::chrono::steady_clock::now();
   arena.execute([&] {
-    tbb::parallel_for(0, threads, [&](int) {
-      while (work.Claim(stages::kClaim, add)) {
+    tbb::parallel_for(uint32_t{0}, threads, [&](uint32_t worker) {
+      while (work.Claim(worker, stages::kClaim, add)) {
       }
     });
   });

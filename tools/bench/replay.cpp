@@ -226,7 +226,7 @@ RayLog RecordRays(const KernelContext& context, const stages::Kernels& kernels, 
   Window window(context, kernels, log);
   stages::CameraWork work(context.width, context.height,
                           {.first_sample = 0, .sample_count = samples});
-  while (work.Claim(1024, [&](const stages::CameraPacket& packet) { window.Add(packet); })) {
+  while (work.Claim(0, 1024, [&](const stages::CameraPacket& packet) { window.Add(packet); })) {
   }
   window.Follow();
   return log;
