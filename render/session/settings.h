@@ -58,7 +58,7 @@ inline constexpr int kMaxSide = 65'536;                // pixels along one side 
 inline constexpr std::int64_t kMaxPixels = 1ll << 28;  // pixels in one image
 inline constexpr int kMaxSamples = 1 << 20;            // samples per pixel
 inline constexpr int kMaxDepth = 256;                  // scattering vertices of a path
-inline constexpr int kRouletteDepth = 3;               // default of RenderSettings::roulette_depth
+inline constexpr int kRouletteDepth = 1;               // default of RenderSettings::roulette_depth
 inline constexpr int kMaxThreads = 4096;
 inline constexpr int kMinBatchItems = 8, kMaxBatchItems = 65'536;
 inline constexpr int kDefaultWidth = 1280;  // pixels, where no size is asked for

@@ -48,7 +48,7 @@ struct KernelContext {
   uint32_t width = 1, height = 1;
   uint32_t seed = 0;
   uint32_t max_depth = 8;       // scattering events
-  uint32_t roulette_depth = 3;  // events before Russian roulette
+  uint32_t roulette_depth = 1;  // events before Russian roulette
   DirectSampling direct = DirectSampling::mis;
   PathProbe* probe = nullptr;  // set where one path alone is followed, to explain it
 };

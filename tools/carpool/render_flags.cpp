@@ -64,7 +64,7 @@ void AddSceneFlags(CLI::App& command, RenderFlags& flags) {
       ->type_name("N");
   command
       .add_option("--roulette", s.roulette_depth,
-                  "vertices before Russian roulette may end dark paths (default: 3)")
+                  "vertices before Russian roulette may end dark paths (default: 1)")
       ->type_name("N");
   command
       .add_option(

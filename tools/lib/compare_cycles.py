@@ -179,7 +179,7 @@ def main():
     if flags.no_roulette:
         print("Russian roulette in neither.")
     else:
-        print("Russian roulette: Cycles' own from the first bounce on, Carpool's after three vertices.")
+        print("Russian roulette: Cycles' own from the first bounce on, Carpool's from the second.")
     print("Medians; sampling time alone.")
     for case in cases_of(flags):
         if not os.path.exists(case["scene"]):
