@@ -6,6 +6,7 @@
 
 #include "stages/executors/binning.h"
 #include "stages/executors/executor.h"
+#include "stages/executors/partition.h"
 #include "stages/executors/slot_pool.h"
 #include "stages/simd/denormals.h"
 #include "stages/tables/huge_pages.h"
@@ -15,13 +16,21 @@ namespace {
 
 using Slot = uint32_t;
 constexpr uint32_t kMaxBatch = 65536;
-constexpr size_t kPacketsAtOnce = 8;  // so many packets, and rays, of a batch at a time: what one
-constexpr size_t kRaysAtOnce = 64;  // step leaves of them is in the first-level cache for the next
+// So many packets, and paths, of a batch at a time: what one step leaves of them is in the
+// first-level cache for the next.
+constexpr size_t kPacketsAtOnce = 8;
+constexpr size_t kPathsAtOnce = 8 * kPacketsAtOnce;
 
 struct alignas(64) WorkerTally {
   RayCounts rays;
-  std::vector<Next> next;  // scratch of one batch
 };
+
+/// Calls `visit` with a few slots after another.
+template <class Visit>
+void EachFew(std::span<const Slot> slots, const Visit& visit) {
+  for (size_t i = 0; i < slots.size(); i += kPathsAtOnce)
+    visit(slots.subspan(i, std::min(kPathsAtOnce, slots.size() - i)));
+}
 
 uint32_t BlockItems(const ExecutorOptions& options, uint32_t preferred) {
   return options.batch_items != 0 ? std::min(options.batch_items, kMaxBatch) : preferred;
@@ -82,27 +91,7 @@ class Wavefront final : public Executor {
   void MissKernel(const Batch<Slot>& batch, Emitter& out);
   void FilmKernel(const Batch<Slot>& batch);
 
-  struct Destination {
-    const StageHandle<Slot>* stage;
-    uint32_t bin;
-    bool operator==(const Destination&) const = default;
-  };
-  Destination AfterTrace(Slot slot) const {
-    const PathState& path = paths_[slot];
-    if (path.placement >= 0)
-      return {&shade_, bins_.Of(material_of_placement_[path.placement], path.flags)};
-    return {has_environment_ ? &miss_ : &film_, 0};
-  }
-  /// Emits neighbours that go to the same place together: most of them, where rays are coherent.
-  void EmitRuns(std::span<const Slot> slots, Emitter& out) const {
-    for (size_t i = 0; i < slots.size();) {
-      const Destination to = AfterTrace(slots[i]);
-      size_t end = i + 1;
-      while (end < slots.size() && AfterTrace(slots[end]) == to) ++end;
-      out.emit(*to.stage, to.bin, slots.subspan(i, end - i));
-      i = end;
-    }
-  }
+  void EmitTraced(std::span<const Slot> slots, Emitter& out) const;
   SourceStatus ClaimPackets(SourceContext& source, Emitter& out);
 
   const KernelContext& c_;
@@ -182,6 +171,17 @@ void Wavefront::BuildGraph() {
   }
 }
 
+/// Paths that hit something go to its bin, the others to the environment, if there is one.
+void Wavefront::EmitTraced(std::span<const Slot> slots, Emitter& out) const {
+  const Partition<2, kPathsAtOnce> by_hit(
+      slots, [&](Slot slot, size_t) { return paths_[slot].placement >= 0 ? 1 : 0; });
+  out.emit(has_environment_ ? miss_ : film_, 0, by_hit.List(0));
+  out.emit_each(by_hit.List(1), [&](Slot slot) {
+    const PathState& path = paths_[slot];
+    return std::pair(shade_, bins_.Of(material_of_placement_[path.placement], path.flags));
+  });
+}
+
 SourceStatus Wavefront::ClaimPackets(SourceContext& source, Emitter& out) {
   if (stop_->load(std::memory_order_relaxed)) return SourceStatus::exhausted;
   const bool more = work_->Claim(source.worker, source.budget,
@@ -200,7 +200,7 @@ void Wavefront::CameraKernel(const Batch<CameraPacket>& batch, Emitter& out) {
 
 void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worker,
                            WorkerTally& tally, Emitter& out) {
-  std::array<Slot, kPacketsAtOnce * 8> taken;
+  std::array<Slot, kPathsAtOnce> taken;
   size_t count = 0;
   for (const CameraPacket& packet : packets)
     EachPixel(packet, c_.width, c_.height, [&](uint32_t, uint32_t) { ++count; });
@@ -222,50 +222,49 @@ void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worke
               [&](uint32_t i, uint32_t) { group[i] = &paths_[slots[next++]]; });
     IntersectPacket(c_.trace, group.data());
   }
-  EmitRuns(slots, out);
+  EmitTraced(slots, out);
   tally.rays.camera += count;
 }
 
 void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {
   const FlushDenormals denormals;
-  for (size_t i = 0; i < batch.items.size(); i += kRaysAtOnce) {
-    const auto some = batch.items.subspan(i, std::min(kRaysAtOnce, batch.items.size() - i));
+  EachFew(batch.items, [&](std::span<const Slot> some) {
     if (options_.simd) {
       IntersectPaths(c_.trace, paths_.data(), some);
     } else {
       for (const Slot slot : some) IntersectPath(c_.trace, paths_[slot]);
     }
-    for (const Slot slot : some) {
-      const Destination to = AfterTrace(slot);
-      out.emit(*to.stage, to.bin, slot);
-    }
-  }
+    EmitTraced(some, out);
+  });
   tallies_[batch.worker].rays.bounce += batch.items.size();
 }
 
 void Wavefront::ShadeKernel(const Batch<Slot>& batch, Emitter& out) {
   const FlushDenormals denormals;
-  std::vector<Next>& next = tallies_[batch.worker].next;
-  next.resize(batch.items.size());
-  kernels_.shade(c_, paths_.data(), batch.items, next.data());
-  for (size_t i = 0; i < batch.items.size(); ++i) {
-    const StageHandle<Slot>& to = next[i] == Next::shadow  ? shadow_
-                                  : next[i] == Next::trace ? intersect_
-                                                           : film_;
-    out.emit(to, 0, batch.items[i]);
-  }
+  EachFew(batch.items, [&](std::span<const Slot> some) {
+    std::array<Next, kPathsAtOnce> next;
+    kernels_.shade(c_, paths_.data(), some, next.data());
+    const Partition<3, kPathsAtOnce> by_next(
+        some, [&](Slot, size_t i) { return static_cast<size_t>(next[i]); });
+    if (has_shadow_) out.emit(shadow_, 0, by_next.List(static_cast<size_t>(Next::shadow)));
+    out.emit(intersect_, 0, by_next.List(static_cast<size_t>(Next::trace)));
+    out.emit(film_, 0, by_next.List(static_cast<size_t>(Next::film)));
+  });
 }
 
 void Wavefront::ShadowKernel(const Batch<Slot>& batch, Emitter& out) {
   const FlushDenormals denormals;
-  if (options_.simd) {
-    TraceShadows(c_.trace, opacity_, paths_.data(), batch.items);
-  } else {
-    for (const Slot slot : batch.items) TraceShadow(c_.trace, opacity_, paths_[slot]);
-  }
-  for (const Slot slot : batch.items) {
-    out.emit((paths_[slot].flags & kPathAlive) != 0 ? intersect_ : film_, 0, slot);
-  }
+  EachFew(batch.items, [&](std::span<const Slot> some) {
+    if (options_.simd) {
+      TraceShadows(c_.trace, opacity_, paths_.data(), some);
+    } else {
+      for (const Slot slot : some) TraceShadow(c_.trace, opacity_, paths_[slot]);
+    }
+    const Partition<2, kPathsAtOnce> by_life(
+        some, [&](Slot slot, size_t) { return (paths_[slot].flags & kPathAlive) != 0 ? 1 : 0; });
+    out.emit(film_, 0, by_life.List(0));
+    out.emit(intersect_, 0, by_life.List(1));
+  });
   tallies_[batch.worker].rays.shadow += batch.items.size();
 }
 
