@@ -89,22 +89,37 @@ LightCluster ClusterOf(const PunctualInput& p, int32_t light) {
   return c;
 }
 
-LightType TypeOf(const TriangleEmission& t) {
-  return t.two_sided ? LightType::two_sided_triangle : LightType::triangle;
+Light RecordOf(const TriangleEmission& t, bool mirrored) {
+  Light light;
+  light.type = t.two_sided ? LightType::two_sided_triangle
+               : mirrored  ? LightType::mirrored_triangle
+                           : LightType::triangle;
+  light.placement = t.placement;
+  light.primitive = t.primitive;
+  stages::TriangleFields fields;
+  std::copy_n(t.p0, 3, fields.p0);
+  std::copy_n(t.p1, 3, fields.p1);
+  std::copy_n(t.p2, 3, fields.p2);
+  fields.red = t.varies ? -1 : t.radiance[0];
+  fields.green = t.radiance[1];
+  fields.blue = t.radiance[2];
+  light.triangle = fields;
+  return light;
 }
 
 Light RecordOf(const PunctualInput& p) {
   Light light;
   light.type = p.type;
-  light.range = p.range;
+  stages::PunctualFields& fields = light.punctual;
+  fields.range = p.range;
   const Point3 direction = UnitOr(Wide(p.direction));
   for (int i = 0; i < 3; ++i) {
-    light.position[i] = p.position[i];
-    light.direction[i] = static_cast<float>(direction[i]);
-    light.intensity[i] = p.intensity[i];
+    fields.position[i] = p.position[i];
+    fields.direction[i] = static_cast<float>(direction[i]);
+    fields.intensity[i] = p.intensity[i];
   }
-  light.cos_inner = static_cast<float>(std::cos(double{p.inner_cone}));
-  light.cos_outer = static_cast<float>(std::cos(double{p.outer_cone}));
+  fields.cos_inner = static_cast<float>(std::cos(double{p.inner_cone}));
+  fields.cos_outer = static_cast<float>(std::cos(double{p.outer_cone}));
   return light;
 }
 
@@ -126,13 +141,9 @@ void AddTriangles(stages::SceneTables& scene, std::span<const TriangleEmission> 
     placement = t.placement;
     next = t.primitive + 1;
 
-    Light record;
-    record.type = TypeOf(t);
-    record.placement = t.placement;
-    record.primitive = t.primitive;
-    scene.lights.lights.push_back(record);
-    const LightCluster cluster =
-        ClusterOf(t, (place.flags & stages::kPlacementMirrored) != 0, light);
+    const bool mirrored = (place.flags & stages::kPlacementMirrored) != 0;
+    scene.lights.lights.push_back(RecordOf(t, mirrored));
+    const LightCluster cluster = ClusterOf(t, mirrored, light);
     if (cluster.power > 0) clusters.push_back(cluster);
   }
 }

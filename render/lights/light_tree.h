@@ -13,7 +13,9 @@ struct TriangleEmission {
   int32_t placement = 0;
   int32_t primitive = 0;
   float p0[3] = {0, 0, 0}, p1[3] = {0, 0, 0},
-        p2[3] = {0, 0, 0};       // in the order of the index stream
+        p2[3] = {0, 0, 0};        // in the order of the index stream
+  float radiance[3] = {1, 1, 1};  // cd/m2, unless a texture makes it vary
+  bool varies = false;
   float radiance_luminance = 0;  // mean over the triangle, cd/m2
   bool two_sided = false;
 };

@@ -63,19 +63,20 @@ void PlanEffects(Plan& plan, const std::vector<Material>& used) {
   AddEffect(plan, "unlit surfaces", CountIf(used, IsUnlit), "with KHR_materials_unlit");
 }
 
-size_t CountLights(const SceneTables& tables, stages::LightType type) {
+template <class OfKind>
+size_t CountLights(const SceneTables& tables, const OfKind& of_kind) {
   const auto& lights = tables.lights.lights;
   return static_cast<size_t>(
       std::count_if(lights.begin(), lights.end(),
-                    [&](const stages::Light& light) { return light.type == type; }));
+                    [&](const stages::Light& light) { return of_kind(light.type); }));
 }
 
 void PlanLights(Plan& plan, const PreparedScene& scene) {
   const stages::LightTables& lights = scene.tables.lights;
-  const size_t triangles = CountLights(scene.tables, stages::LightType::triangle) +
-                           CountLights(scene.tables, stages::LightType::two_sided_triangle);
-  const size_t punctual = CountLights(scene.tables, stages::LightType::point) +
-                          CountLights(scene.tables, stages::LightType::spot);
+  const size_t triangles = CountLights(scene.tables, stages::IsTriangle);
+  const size_t punctual = CountLights(scene.tables, [](stages::LightType type) {
+    return type == stages::LightType::point || type == stages::LightType::spot;
+  });
   const auto add = [&](const char* name, bool present, std::string why) {
     plan.parts.push_back({"light", name, present, std::move(why)});
   };

@@ -113,12 +113,14 @@ TriangleEmission EmissionOf(const SceneTables& scene, int32_t placement, int32_t
   WorldVertex(g, p, index[0], e.p0);
   WorldVertex(g, p, index[1], e.p1);
   WorldVertex(g, p, index[2], e.p2);
+  std::copy_n(material.emissive, 3, e.radiance);
   e.two_sided = (material.flags & stages::kMaterialDoubleSided) != 0;
   const int32_t slot = material.slots[static_cast<int>(stages::Slot::emissive)];
   if (slot == kNone) {
     e.radiance_luminance = static_cast<float>(
         Luminance({material.emissive[0], material.emissive[1], material.emissive[2]}));
   } else {
+    e.varies = true;
     const TextureSlot& s = scene.textures.slots[slot];
     const std::array<Uv, 3> corners = {VertexUv(g, p, index[0], s.uv_set),
                                        VertexUv(g, p, index[1], s.uv_set),

@@ -35,19 +35,8 @@ double Length(const Point& a) {
   return std::hypot(a[0], a[1], a[2]);
 }
 
-/// Corner `k` of a triangle, in world space.
-Point Corner(const stages::GeometryTables& g, const Light& light, uint32_t k) {
-  const stages::Placement& p = g.placements[light.placement];
-  const uint32_t vertex =
-      g.indices[static_cast<size_t>(p.first_index) + 3 * static_cast<size_t>(light.primitive) + k];
-  const float* const local = &g.floats[static_cast<size_t>(p.positions) + 3 * size_t{vertex}];
-  Point world;
-  for (size_t r = 0; r < 3; ++r) {
-    const float* const row = p.object_to_world + 4 * r;
-    world[r] =
-        double{row[0]} * local[0] + double{row[1]} * local[1] + double{row[2]} * local[2] + row[3];
-  }
-  return world;
+Point PointAt(const float p[3]) {
+  return {p[0], p[1], p[2]};
 }
 
 /// The largest coordinate of anything in the scene.
@@ -80,13 +69,12 @@ double Nearest(const stages::TraceView& trace, const Point& from, const Point& d
              : std::numeric_limits<double>::infinity();
 }
 
-double NearestOfTriangle(const stages::GeometryTables& g, const stages::TraceView& trace,
-                         const Light& light, double reach) {
-  const Point a = Corner(g, light, 0), b = Corner(g, light, 1), c = Corner(g, light, 2);
+double NearestOfTriangle(const stages::TraceView& trace, const Light& light, double reach) {
+  const Point a = PointAt(light.triangle.p0), b = PointAt(light.triangle.p1),
+              c = PointAt(light.triangle.p2);
   Point normal = Cross(b - a, c - a);
   if (!(Length(normal) > 0)) return std::numeric_limits<double>::infinity();
-  const bool mirrored = (g.placements[light.placement].flags & stages::kPlacementMirrored) != 0;
-  normal = (mirrored ? -1 : 1) / Length(normal) * normal;
+  normal = (light.type == LightType::mirrored_triangle ? -1 : 1) / Length(normal) * normal;
   const Point third = 1.0 / 3 * (a + b + c);
   double nearest = std::numeric_limits<double>::infinity();
   for (const Point& from : {third, 0.5 * (third + a), 0.5 * (third + b), 0.5 * (third + c)}) {
@@ -98,7 +86,7 @@ double NearestOfTriangle(const stages::GeometryTables& g, const stages::TraceVie
 }
 
 double NearestOfPoint(const stages::TraceView& trace, const Light& light, double reach) {
-  const Point from = {light.position[0], light.position[1], light.position[2]};
+  const Point from = PointAt(light.punctual.position);
   double nearest = std::numeric_limits<double>::infinity();
   for (const double x : {-1.0, 0.0, 1.0}) {
     for (const double y : {-1.0, 0.0, 1.0}) {
@@ -128,9 +116,8 @@ void WarnOfWallsNearLights(const PreparedScene& scene, const stages::TraceView& 
   for (size_t i = 0; i < lights.size(); i += step) {
     const Light& light = lights[i];
     if (light.type == LightType::directional) continue;
-    const double distance = light.type <= LightType::two_sided_triangle
-                                ? NearestOfTriangle(scene.tables.geometry, trace, light, reach)
-                                : NearestOfPoint(trace, light, reach);
+    const double distance = IsTriangle(light.type) ? NearestOfTriangle(trace, light, reach)
+                                                   : NearestOfPoint(trace, light, reach);
     ++looked_at;
     if (distance > reach) continue;
     ++hidden;

@@ -26,9 +26,9 @@ template <class D>
 struct LightSample {
   Vec3<D> wi;        // unit, from the receiver
   Real<D> distance;  // to the light; kFarAway where it is infinitely far
-  /// environment: radiance; punctual: irradiance on a surface facing `wi`; triangle: 1, to be
-  /// multiplied by the emission at (b1, b2).
+  /// environment and triangle: radiance; punctual: irradiance on a surface facing `wi`.
   Vec3<D> radiance_or_irradiance;
+  Mask<D> varies;  // triangle: that is 1, to be multiplied by the emission at (b1, b2)
   Real<D> pdf;     // per solid angle (1 for delta lights) x selection; 0: no sample
   Mask<D> delta;   // punctual: no other way of finding the light
   Int<D> light;    // kNone: the environment, or no sample
@@ -68,6 +68,7 @@ HWY_INLINE LightSample<D> Merge(D d, Mask<D> m, const LightSample<D>& a, const L
   return {Select<D>(m, b.wi, a.wi),
           hn::IfThenElse(m, b.distance, a.distance),
           Select<D>(m, b.radiance_or_irradiance, a.radiance_or_irradiance),
+          hn::Or(hn::AndNot(m, a.varies), hn::And(m, b.varies)),
           hn::IfThenElse(m, b.pdf, a.pdf),
           hn::Or(hn::AndNot(m, a.delta), hn::And(m, b.delta)),
           hn::IfThenElse(ToIntMask(d, m), b.light, a.light),
@@ -81,37 +82,37 @@ HWY_INLINE LightSample<D> NoLight(D d) {
   const Real<D> zero = hn::Zero(d);
   const Mask<D> never = hn::Lt(zero, zero);
   const Int<D> none = hn::Set(IntTag<D>(), kNone);
-  return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0), zero, never, none, zero, zero, zero};
+  return {Splat3(d, 0, 0, 1), zero, Splat3(d, 0, 0, 0), never, zero, never, none, zero, zero, zero};
 }
 
 /// What kind of light it is, and which triangle.
 template <class D>
 struct LightName {
-  Mask<D> triangle, one_sided;
+  Mask<D> triangle, two_sided, mirrored;
   Int<D> placement, primitive;  // meaningless unless it is a triangle
 };
 template <class D>
 HWY_INLINE LightName<D> LoadLightName(D d, const LightView& view, Int<D> light) {
   const IntTag<D> di;
   const IntQuad<D> q = FieldIntQuad(d, view.lights, light, offsetof(Light, type));
-  return {ToMask(d, hn::Lt(q.x, hn::Set(di, kLastTriangleType + 1))),
-          ToMask(d, hn::Eq(q.x, hn::Set(di, static_cast<int32_t>(LightType::triangle)))), q.y, q.z};
+  const auto is = [&](LightType wanted) HWY_ATTR {
+    return ToMask(d, hn::Eq(q.x, hn::Set(di, static_cast<int32_t>(wanted))));
+  };
+  return {ToMask(d, hn::Lt(q.x, hn::Set(di, static_cast<int32_t>(kLastTriangleType) + 1))),
+          is(LightType::two_sided_triangle), is(LightType::mirrored_triangle), q.y, q.z};
 }
 static_assert(offsetof(Light, placement) == offsetof(Light, type) + 4 &&
               offsetof(Light, primitive) == offsetof(Light, type) + 8);
 
 /// `pdf` of the result has no selection in it. A light with one side gives nothing behind it.
 template <class D>
-HWY_INLINE LightSample<D> FromTriangle(D d, const LightView& view, Mask<D> active, Int<D> light,
+HWY_INLINE LightSample<D> FromTriangle(D d, const LightView& view, Int<D> light,
                                        const LightName<D>& name, const Vec3<D>& ref,
                                        const Vec2<D>& u) {
-  // Idle lanes take the first light: where there are triangle lights, it is one.
-  const auto or_first = [&](Int<D> value, int32_t first) HWY_ATTR {
-    return hn::IfThenElse(ToIntMask(d, active), value, hn::Set(IntTag<D>(), first));
-  };
-  const Triangle<D> triangle =
-      TriangleVertices(d, view.geometry, or_first(name.placement, view.lights->placement),
-                       or_first(name.primitive, view.lights->primitive));
+  const Quad<D> a = FieldQuad(d, view.lights, light, offsetof(Light, triangle.p0));
+  const Quad<D> b = FieldQuad(d, view.lights, light, offsetof(Light, triangle.p1));
+  const Quad<D> c = FieldQuad(d, view.lights, light, offsetof(Light, triangle.p2));
+  const Triangle<D> triangle = {{a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z}, name.mirrored};
   const TriangleLightSample<D> s =
       SampleTriangleLight(d, triangle.p0, triangle.p1, triangle.p2, ref, u);
   const Mask<D> behind =
@@ -119,8 +120,10 @@ HWY_INLINE LightSample<D> FromTriangle(D d, const LightView& view, Mask<D> activ
   LightSample<D> sample = NoLight(d);
   sample.wi = s.wi;
   sample.distance = s.distance;
-  sample.radiance_or_irradiance = Splat3(d, 1, 1, 1);
-  sample.pdf = hn::IfThenZeroElse(hn::And(name.one_sided, behind), s.pdf);
+  sample.varies = hn::Lt(a.w, hn::Zero(d));
+  sample.radiance_or_irradiance =
+      Select<D>(sample.varies, Splat3(d, 1, 1, 1), Vec3<D>{a.w, b.w, c.w});
+  sample.pdf = hn::IfThenZeroElse(hn::AndNot(name.two_sided, behind), s.pdf);
   sample.light = light;
   sample.b1 = s.b1;
   sample.b2 = s.b2;
@@ -231,8 +234,7 @@ HWY_INLINE LightSample<D> SampleChosen(D d, const LightView& view, Mask<D> activ
   const Mask<D> triangle = hn::And(has_light, name.triangle);
   const Mask<D> punctual = hn::AndNot(triangle, has_light);
   if (!hn::AllFalse(d, triangle)) {
-    sample = Merge(d, triangle, sample,
-                   FromTriangle(d, view, triangle, light, name, position, choice.u));
+    sample = Merge(d, triangle, sample, FromTriangle(d, view, light, name, position, choice.u));
   }
   if (!hn::AllFalse(d, punctual)) {
     sample = Merge(d, punctual, sample, FromPunctual(d, view, light, position));

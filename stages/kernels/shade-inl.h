@@ -252,26 +252,24 @@ HWY_INLINE SurfaceParams<D> MaterialParams(D d, const KernelContext& c, const Ve
   return params;
 }
 
-/// Radiance that a sampled triangle light sends towards `wi`'s origin; other lights know theirs
+/// Radiance that a light sends towards `wi`'s origin; all but textured triangles know theirs
 /// already.
 template <class D>
 HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const lights::LightSample<D>& light,
                                    Mask<D> active) {
   const IntTag<D> di;
-  const Mask<D> is_light = hn::And(active, IsPresent(d, light.light));
-  if (hn::AllFalse(d, is_light)) return light.radiance_or_irradiance;
-  const Int<D> valid = hn::IfThenElseZero(hn::RebindMask(di, is_light), light.light);
-  const lights::LightName<D> name = lights::LoadLightName(d, c.lights, valid);
-  const Mask<D> triangle = hn::And(is_light, name.triangle);
-  if (hn::AllFalse(d, triangle)) return light.radiance_or_irradiance;
+  const Mask<D> varies = hn::And(active, light.varies);
+  if (hn::AllFalse(d, varies)) return light.radiance_or_irradiance;
 
-  const auto where = hn::RebindMask(di, triangle);
+  const auto where = hn::RebindMask(di, varies);
+  const Int<D> valid = hn::IfThenElseZero(where, light.light);
+  const lights::LightName<D> name = lights::LoadLightName(d, c.lights, valid);
   const SurfacePoint<D> at =
       MakeSurfacePoint(d, c, hn::IfThenElseZero(where, name.placement),
                        hn::IfThenElseZero(where, name.primitive), light.b1, light.b2);
   const Vec2<D> uv = TextureCoordinates(d, c, at, hn::Zero(di));
-  const Vec3<D> emitted = EmittedRadiance(d, c, at, uv, triangle);
-  return Select<D>(triangle, Mul<D>(light.radiance_or_irradiance, emitted),
+  const Vec3<D> emitted = EmittedRadiance(d, c, at, uv, varies);
+  return Select<D>(varies, Mul<D>(light.radiance_or_irradiance, emitted),
                    light.radiance_or_irradiance);
 }
 
@@ -341,8 +339,8 @@ struct Bounce {
 };
 
 /// Probability with which Russian roulette lets a path go on. The root ends paths later than the
-/// throughput itself would, and may begin earlier for it; exponent and scale are those that gave the
-/// least relMSE x time over a set of scenes (stages/README.md).
+/// throughput itself would, and may begin earlier for it; exponent and scale are those that gave
+/// the least relMSE x time over a set of scenes (stages/README.md).
 template <class D>
 HWY_INLINE Real<D> Survival(D d, Real<D> throughput) {
   return hn::Min(hn::Sqrt(throughput * Splat(d, 1.5)), Splat(d, 1));

@@ -10,26 +10,47 @@
 namespace carpool::stages {
 
 enum class LightType : int32_t {
-  triangle = 0,  // emits on the side of its geometric normal
-  two_sided_triangle = 1,
-  point = 2,
-  spot = 3,
-  directional = 4,
+  triangle = 0,           // emits on the side of its geometric normal by the order of its vertices
+  mirrored_triangle = 1,  // emits on the other side
+  two_sided_triangle = 2,
+  point = 3,
+  spot = 4,
+  directional = 5,
 };
-constexpr int32_t kLastTriangleType = 1;  // types up to here are triangles
+constexpr LightType kLastTriangleType = LightType::two_sided_triangle;
+constexpr bool IsTriangle(LightType type) {
+  return type <= kLastTriangleType;
+}
 
-/// One light: 16 words. Positions and directions are world space relative to `SceneTables::origin`.
-struct alignas(64) Light {
-  LightType type = LightType::triangle;
-  int32_t placement = 0;  // triangle: which placement ...
-  int32_t primitive = 0;  // ... and which of its triangles
-  int32_t leaf = -1;      // its leaf's index in the light tree; -1: not in the tree (directional)
+/// What a light of KHR_lights_punctual is. World space relative to `SceneTables::origin`.
+struct PunctualFields {
   float position[3] = {0, 0, 0};    // point, spot
   float range = 0;                  // point, spot: KHR_lights_punctual range; 0: infinite
   float direction[3] = {0, 0, -1};  // spot, directional: the way the light shines, unit length
   float cos_inner = 1;              // spot: cosines of the cone angles
   float intensity[3] = {0, 0, 0};   // point, spot: candela x colour; directional: lux x colour
   float cos_outer = 0;
+};
+
+/// What a triangle that emits is, so that sampling it needs nothing but its light: vertices in
+/// world space in the order of the index stream, and the radiance that it has everywhere. Red below
+/// 0: its radiance varies, ask the material.
+struct TriangleFields {
+  float p0[3], red;
+  float p1[3], green;
+  float p2[3], blue;
+};
+
+/// One light: 16 words.
+struct alignas(64) Light {
+  LightType type = LightType::triangle;
+  int32_t placement = 0;  // triangle: which placement ...
+  int32_t primitive = 0;  // ... and which of its triangles
+  int32_t leaf = -1;      // its leaf's index in the light tree; -1: not in the tree (directional)
+  union {
+    PunctualFields punctual = {};
+    TriangleFields triangle;
+  };
 };
 static_assert(sizeof(Light) == 64);
 

@@ -157,7 +157,8 @@ bool Shines(const LightScene& s, size_t light, const LightQuery& q) {
   const Light& record = s.scene.lights.lights[light];
   if (record.type == LightType::point) return true;
   if (record.type == LightType::spot) {
-    return towards(record.position, record.direction) > record.cos_outer + 1e-6;
+    return towards(record.punctual.position, record.punctual.direction) >
+           record.punctual.cos_outer + 1e-6;
   }
   const render::TriangleEmission& t = s.triangles[light];
   double e[3], f[3];
@@ -260,8 +261,7 @@ TEST(LightTree, ReceiversOnALightGetFiniteProbabilities) {
     for (size_t light = 0; light < s.scene.lights.lights.size(); light += 7) {
       LightQuery receiver;
       const Light& record = s.scene.lights.lights[light];
-      const float* at =
-          record.type <= LightType::two_sided_triangle ? s.triangles[light].p0 : record.position;
+      const float* at = IsTriangle(record.type) ? s.triangles[light].p0 : record.punctual.position;
       std::copy(at, at + 3, receiver.position);
       double sum = 0;
       for (const double p : Probabilities(runner, s, receiver)) sum += p;
