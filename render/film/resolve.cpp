@@ -21,14 +21,28 @@ uint32_t ScrambleSamples(uint32_t samples, int scramble) {
   return (samples + kScrambles - 1 - static_cast<uint32_t>(scramble)) / kScrambles;
 }
 
-Triple MeanOf(const FilmAccumulator& film, uint32_t pixel) {
-  const uint32_t n = film.Samples(pixel);
+/// What a pixel has gathered, read once: the film's sums are 128-bit integers, which take a while
+/// to become numbers.
+struct PixelSums {
+  PixelSums(const FilmAccumulator& film, uint32_t pixel) : samples(film.Samples(pixel)) {
+    for (int g = 0; g < kScrambles; ++g) {
+      for (int c = 0; c < 3; ++c) of_scramble[g][c] = film.Sum(pixel, g, c);
+    }
+  }
+  uint32_t samples;
+  std::array<Triple, kScrambles> of_scramble;
+};
+
+Triple MeanOf(const PixelSums& sums) {
   Triple mean = {};
-  for (int c = 0; c < 3 && n > 0; ++c) {
-    for (int g = 0; g < kScrambles; ++g) mean[c] += film.Sum(pixel, g, c);
-    mean[c] /= n;
+  for (int c = 0; c < 3 && sums.samples > 0; ++c) {
+    for (const Triple& sum : sums.of_scramble) mean[c] += sum[c];
+    mean[c] /= sums.samples;
   }
   return mean;
+}
+Triple MeanOf(const FilmAccumulator& film, uint32_t pixel) {
+  return MeanOf(PixelSums(film, pixel));
 }
 
 double LuminanceOf(const Triple& rgb) {
@@ -42,18 +56,17 @@ struct PixelVariance {
   bool known = false;
 };
 
-PixelVariance VarianceOf(const FilmAccumulator& film, uint32_t pixel) {
-  const uint32_t n = film.Samples(pixel);
+PixelVariance VarianceOf(const PixelSums& sums, const Triple& mean) {
+  const uint32_t n = sums.samples;
   PixelVariance variance;
   if (n < 2) return variance;
-  const Triple mean = MeanOf(film, pixel);
   int groups = 0;
   for (int g = 0; g < kScrambles; ++g) {
     const uint32_t count = ScrambleSamples(n, g);
     if (count == 0) continue;
     ++groups;
     Triple difference;
-    for (int c = 0; c < 3; ++c) difference[c] = film.Sum(pixel, g, c) / count - mean[c];
+    for (int c = 0; c < 3; ++c) difference[c] = sums.of_scramble[g][c] / count - mean[c];
     const double weight = static_cast<double>(count) / n;
     for (int c = 0; c < 3; ++c) variance.channel[c] += weight * difference[c] * difference[c];
     const double luminance = LuminanceOf(difference);
@@ -143,7 +156,8 @@ RgbPlane ResolveStandardError(const FilmAccumulator& film) {
     Triple pooled = {};
     uint32_t known = 0;
     ForPixels(film, tile, [&](uint32_t pixel) {
-      const PixelVariance v = VarianceOf(film, pixel);
+      const PixelSums sums(film, pixel);
+      const PixelVariance v = VarianceOf(sums, MeanOf(sums));
       known += v.known ? 1 : 0;
       for (int c = 0; c < 3; ++c) pooled[c] += v.channel[c];
     });
@@ -163,10 +177,12 @@ double EstimateNoise(const FilmAccumulator& film) {
     Noise noise;
     uint32_t pixels = 0;
     ForPixels(film, tile, [&](uint32_t pixel) {
-      const PixelVariance v = VarianceOf(film, pixel);
+      const PixelSums sums(film, pixel);
+      const Triple mean = MeanOf(sums);
+      const PixelVariance v = VarianceOf(sums, mean);
       noise.error += v.luminance;
       noise.known += v.known ? 1 : 0;
-      noise.luminance += LuminanceOf(MeanOf(film, pixel));
+      noise.luminance += LuminanceOf(mean);
       ++pixels;
     });
     noise.error = noise.known == 0 ? 0 : std::sqrt(noise.error / noise.known);

@@ -68,6 +68,10 @@ class Executor {
   /// Why this one drives the kernels, where that was for it to decide; else empty.
   virtual std::string Why() const { return {}; }
 
+  /// How many paths it follows at once at most, beside one per thread: with fewer, a measurement
+  /// would be of how they start and end.
+  virtual uint64_t PathsInFlight() const { return 0; }
+
   /// Renders one pass. `stop` ends it early: no new camera rays, what is in flight comes to its
   /// end. `progress`, if set, is called now and then by some worker with the fraction done.
   virtual PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,

@@ -12,8 +12,9 @@
 namespace carpool::stages {
 namespace {
 
-// Fewer paths than this would measure how the queues fill and drain.
-constexpr double kPartPaths = 65536;
+// Fewer paths than this would measure the clock. More are for who follows many at once: candidates
+// may be several times slower than the best, and what they are tried with is lost.
+constexpr uint64_t kLeastPaths = 16384;
 constexpr int kRounds = 3;           // each candidate's parts at most; their median counts
 constexpr double kClearLead = 1.25;  // one round is enough where it shows this much
 
@@ -78,8 +79,12 @@ class Fastest final : public Executor {
                     const std::function<void(double)>& progress) override {
     Parts parts(pass, stop, progress);
     const double paths = static_cast<double>(pixels_ * pass.sample_count) / kPhases;
-    const int part = static_cast<int>(std::ceil(kPartPaths / paths));  // its phases
-    while (!decided_ && !parts.Stopped() && part <= parts.Left()) Try(parts, part);
+    while (!decided_ && !parts.Stopped()) {
+      const uint64_t wanted = std::max(kLeastPaths, candidates_[turn_]->PathsInFlight());
+      const int part = static_cast<int>(std::ceil(static_cast<double>(wanted) / paths));
+      if (part > parts.Left()) break;
+      Try(parts, part);
+    }
     if (!parts.Stopped() && parts.Left() > 0) parts.Render(*candidates_[chosen_], parts.Left());
     return parts.Sum();
   }

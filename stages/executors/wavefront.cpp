@@ -38,7 +38,7 @@ uint32_t BlockItems(const ExecutorOptions& options, uint32_t preferred) {
 
 /// Paths in flight: enough to fill the bins, few enough for the cache and the memory asked for. A
 /// quarter of the budget is left to the queues.
-uint32_t PathsInFlight(const ExecutorOptions& options) {
+uint32_t PathsThatFit(const ExecutorOptions& options) {
   const uint64_t fitting = options.memory_bytes / 4 * 3 / sizeof(PathState);
   return static_cast<uint32_t>(std::clamp<uint64_t>(fitting, 1024, 65536));
 }
@@ -66,7 +66,7 @@ class Wavefront final : public Executor {
         opacity_{&context, kernels.opacity},
         material_of_placement_(Materials(placements, options.bins)),
         options_(options),
-        in_flight_(PathsInFlight(options)),
+        in_flight_(PathsThatFit(options)),
         bins_(MaterialCount(material_of_placement_), options.bins ? context.max_depth : 0,
               in_flight_, BlockItems(options, 256)),
         pool_(in_flight_, options.threads),
@@ -77,6 +77,7 @@ class Wavefront final : public Executor {
 
   std::string_view name() const override { return "wavefront"; }
   std::string Dot() const override { return graph_.dot(); }
+  uint64_t PathsInFlight() const override { return in_flight_; }
   PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
                     const std::function<void(double)>& progress) override;
 

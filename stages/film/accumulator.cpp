@@ -121,6 +121,7 @@ SampleLedger FilmAccumulator::Ledger() const {
     ledger.entries[static_cast<size_t>(i)] = {fault.count, static_cast<uint32_t>(fault.first),
                                               static_cast<uint32_t>(fault.first >> 32)};
   }
+  if (ledger.Of(SampleFault::clamped).count == 0) return ledger;
   constexpr double kLuminance[3] = {0.2126, 0.7152, 0.0722};
   for (int c = 0; c < 3; ++c) {
     double sum = 0;

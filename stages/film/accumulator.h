@@ -76,8 +76,8 @@ struct SampleLedger {
     uint32_t pixel = 0, sample = 0;  // of the first
   };
   std::array<Entry, kSampleFaults> entries;
-  double energy = 0;          // luminance of all samples that were finite, summed, before the clamp
-  double removed_energy = 0;  // what the clamp took of it
+  double removed_energy = 0;  // what the clamp took of the luminance of all samples, summed ...
+  double energy = 0;          // ... which was this before; 0 where nothing was taken
 
   const Entry& Of(SampleFault fault) const { return entries[static_cast<size_t>(fault)]; }
   uint64_t Count() const {

@@ -15,10 +15,11 @@ constexpr uint64_t kPixels = uint64_t{1} << 20;
 /// Renders nothing and says that it took so many seconds per phase.
 class Fake final : public Executor {
  public:
-  Fake(std::string_view name, double cost, std::vector<CameraPass>& log)
-      : name_(name), cost_(cost), log_(log) {}
+  Fake(std::string_view name, double cost, uint64_t in_flight, std::vector<CameraPass>& log)
+      : name_(name), cost_(cost), in_flight_(in_flight), log_(log) {}
   std::string_view name() const override { return name_; }
   std::string Dot() const override { return {}; }
+  uint64_t PathsInFlight() const override { return in_flight_; }
   PassReport Render(const CameraPass& pass, const std::atomic<bool>& stop,
                     const std::function<void(double)>& progress) override {
     log_.push_back(pass);
@@ -33,6 +34,7 @@ class Fake final : public Executor {
  private:
   std::string_view name_;
   double cost_;
+  uint64_t in_flight_;
   std::vector<CameraPass>& log_;
 };
 
@@ -40,8 +42,8 @@ class FastestTest : public testing::Test {
  protected:
   std::unique_ptr<Executor> Make(double cost_a, double cost_b, uint64_t pixels = kPixels) {
     std::vector<std::unique_ptr<Executor>> candidates;
-    candidates.push_back(std::make_unique<Fake>("a", cost_a, a_));
-    candidates.push_back(std::make_unique<Fake>("b", cost_b, b_));
+    candidates.push_back(std::make_unique<Fake>("a", cost_a, 65536, a_));
+    candidates.push_back(std::make_unique<Fake>("b", cost_b, 0, b_));
     return MakeFastest(std::move(candidates), pixels);
   }
   std::vector<CameraPass> a_, b_;
@@ -93,7 +95,7 @@ TEST_F(FastestTest, MeasuresCloseOnesMoreOften) {
 }
 
 TEST_F(FastestTest, MeasuresOverSeveralPassesIfTheyAreShort) {
-  const auto executor = Make(1, 1.05, 3 * 65536);  // a part is 11 phases
+  const auto executor = Make(1, 1.05, 3 * 65536);  // 11 phases of a are a part, 3 of b
   for (uint32_t sample = 0; sample < 4; ++sample)
     executor->Render({.first_sample = sample, .sample_count = 1}, stop_, {});
   EXPECT_EQ(b_.size(), 3u);
@@ -108,6 +110,15 @@ TEST_F(FastestTest, DoesNotMeasureWhatIsTooShort) {
   EXPECT_TRUE(b_.empty());
   executor->Render({.first_sample = 64, .sample_count = 64, .phases = 0xff}, stop_, {});
   EXPECT_TRUE(b_.empty());
+}
+
+TEST_F(FastestTest, TriesWithLessWhoFollowsFewPathsAtOnce) {
+  Make(1, 3)->Render({.sample_count = 1}, stop_, {});  // 2^15 paths a phase
+  ASSERT_EQ(b_.size(), 1u);
+  EXPECT_EQ(std::popcount(b_[0].phases), 1);
+  ASSERT_EQ(a_.size(), 3u);  // the warm-up, the part that is timed, all that is left
+  EXPECT_EQ(std::popcount(a_[0].phases), 2);
+  EXPECT_EQ(std::popcount(a_[1].phases), 2);
 }
 
 TEST_F(FastestTest, StopsBetweenParts) {

@@ -67,9 +67,7 @@ Result RenderFor(const RenderSettings& settings, double seconds) {
       result.samples += count;
     } while (result.seconds < 0.98 * seconds);
     result.image = render::ResolveBeauty(w.film());
-    const auto has_size = [](const stages::Light& light) {
-      return static_cast<int32_t>(light.type) <= stages::kLastTriangleType;
-    };
+    const auto has_size = [](const stages::Light& light) { return stages::IsTriangle(light.type); };
     const auto& lights = w.scene().tables.lights.lights;
     result.lights_have_size = std::all_of(lights.begin(), lights.end(), has_size);
   });
