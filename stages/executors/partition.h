@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -16,6 +17,7 @@ class Partition {
   /// `code(slot, i)` is the list, below kWays, of the i-th slot.
   template <class Code>
   Partition(std::span<const uint32_t> slots, const Code& code) {
+    assert(slots.size() <= kMost);
     std::array<size_t, kWays> count = {};
     for (size_t i = 0; i < slots.size(); ++i) {
       const uint32_t slot = slots[i];
@@ -31,8 +33,8 @@ class Partition {
   std::span<const uint32_t> List(size_t way) const { return {lists_[way].data(), count_[way]}; }
 
  private:
-  std::array<std::array<uint32_t, kMost>, kWays>
-      lists_;  // a slot is written to all, counted in one
+  // A slot is written to every list and counted in its own.
+  std::array<std::array<uint32_t, kMost>, kWays> lists_;
   std::array<size_t, kWays> count_;
 };
 
