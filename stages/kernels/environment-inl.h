@@ -299,7 +299,7 @@ HWY_INLINE void FindPlace(D d, const EnvironmentView& view, const Vec2<D>& u,
   const Mask<D> beyond =
       hn::Or(hn::And(north, hn::Lt(place.ft, half)), hn::And(south, hn::Gt(place.ft, half)));
   place.ft = hn::IfThenElse(beyond, Splat(d, 1) - place.ft, place.ft);
-  place.sin_theta = hn::Sin(d, RowsFromPole(d, view, place) * Splat(d, kPi / view.height));
+  place.sin_theta = AcuteSine(d, RowsFromPole(d, view, place) * Splat(d, kPi / view.height));
 }
 
 template <class D>
@@ -310,9 +310,11 @@ HWY_INLINE Vec3<D> DirectionOfPlace(D d, const EnvironmentView& view,
     return (from_middle + fraction) * Splat(d, circle / count);
   };
   const Real<D> phi = angle(place.i, place.fs, view.width, 2 * kPi);
+  const Real<D> wrapped = hn::IfThenElse(hn::Gt(phi, Splat(d, kPi)), phi - Splat(d, 2 * kPi), phi);
+  const Angle<D> azimuth = AngleFromRadians(d, wrapped);
   const Real<D> depression = angle(place.j, place.ft, view.height, kPi);
-  return {place.sin_theta * hn::Sin(d, phi), hn::Neg(hn::Sin(d, depression)),
-          hn::Neg(place.sin_theta * hn::Cos(d, phi))};
+  return {place.sin_theta * azimuth.sin, hn::Neg(AcuteSine(d, depression)),
+          hn::Neg(place.sin_theta * azimuth.cos)};
 }
 
 /// A direction drawn in proportion to the map's luminance x sin(theta), bilinear like the map:

@@ -130,20 +130,21 @@ HWY_INLINE SphericalTriangle<D> SeenFrom(D d, const Vec3<D>& p0, const Vec3<D>& 
 /// height of a zone about b is uniform in u.y.
 template <class D>
 HWY_INLINE Vec3<D> SampleSphericalTriangle(D d, const SphericalTriangle<D>& t, const Vec2<D>& u) {
-  const Real<D> half = Splat(d, 0.5) * u.x * t.solid_angle;
-  const Real<D> sin = hn::Sin(d, half), cos = hn::Cos(d, half);
+  const Angle<D> half = AngleFromRadians(d, Splat(d, 0.5) * u.x * t.solid_angle);
   // h halves the arc from a to c' (Peters 2021, section 3.2).
-  const Vec3<D> h =
-      MulAdd(t.a, hn::NegMulAdd(t.ac + t.bc, sin, t.volume * cos), Scale(t.c, t.one_plus_ab * sin));
+  const Vec3<D> h = MulAdd(t.a, hn::NegMulAdd(t.ac + t.bc, half.sin, t.volume * half.cos),
+                           Scale(t.c, t.one_plus_ab * half.sin));
   const Real<D> reflect = SafeDiv(d, Splat(d, 2) * Dot(t.a, h), Dot(h, h));
-  const Vec3<D> c = SafeNormalize(d, Sub<D>(Scale(h, reflect), t.a), t.c);
+  const Vec3<D> c = Sub<D>(Scale(h, reflect), t.a);
 
   // 1 - cos of the arc from b to c', from the chord: no cancellation where the arc is short.
   const Vec3<D> chord = Sub<D>(c, t.b);
   const Real<D> versine = Splat(d, 0.5) * Dot(chord, chord);
-  const Vec3<D> along = SafeNormalize(d, MulAdd(t.b, versine, chord), t.c);
-  const Real<D> w = u.y * versine;
-  return MulAdd(along, SafeSqrt(d, w * (Splat(d, 2) - w)), Scale(t.b, Splat(d, 1) - w));
+  const Real<D> w = u.y * versine, two = Splat(d, 2);
+  // Towards c' at right angles to b, as long as the sine of that arc; shortened to the sine here.
+  const Vec3<D> across = MulAdd(t.b, versine, chord);
+  const Real<D> shorter = SafeSqrt(d, SafeDiv(d, u.y * (two - w), two - versine));
+  return MulAdd(across, shorter, Scale(t.b, Splat(d, 1) - w));
 }
 
 /// Barycentrics of p1 and p2 where the ray from the receiver along `w` meets the plane.
@@ -154,11 +155,9 @@ struct Barycentrics {
 template <class D>
 HWY_INLINE Barycentrics<D> MeetPlane(D d, const SphericalTriangle<D>& t, const Vec3<D>& w) {
   const Real<D> along = Dot(t.area_normal, w);
-  const Real<D> magnitude = hn::Abs(along);
-  const auto share = [&](const Vec3<D>& from, const Vec3<D>& to) HWY_ATTR {
-    const Real<D> part = Dot(w, Cross<D>(from, to));
-    return SafeDiv(d, hn::IfThenElse(hn::Lt(along, hn::Zero(d)), hn::Neg(part), part), magnitude);
-  };
+  const Real<D> inverse = hn::CopySign(SafeDiv(d, Splat(d, 1), hn::Abs(along)), along);
+  const auto share = [&](const Vec3<D>& from, const Vec3<D>& to)
+                         HWY_ATTR { return Dot(w, Cross<D>(from, to)) * inverse; };
   return {share(t.p2, t.p0), share(t.p0, t.p1)};
 }
 
@@ -189,19 +188,18 @@ HWY_INLINE Barycentrics<D> SampleByHemisphere(D d, const SphericalTriangle<D>& t
   const Frame<D> frame =
       MakeFrame(d, Select<D>(hn::Lt(t.triple, hn::Zero(d)), Neg<D>(normal), normal));
   const Real<D> z = u.x, r = SafeSqrt(d, hn::NegMulAdd(z, z, Splat(d, 1)));
-  const Real<D> phi = Splat(d, 2 * kPi) * (u.y - Splat(d, 0.5));
-  return MeetPlane(d, t, ToWorld(frame, Vec3<D>{r * hn::Cos(d, phi), r * hn::Sin(d, phi), z}));
+  const Angle<D> azimuth = AngleFromRadians(d, Splat(d, 2 * kPi) * (u.y - Splat(d, 0.5)));
+  return MeetPlane(d, t, ToWorld(frame, Vec3<D>{r * azimuth.cos, r * azimuth.sin, z}));
 }
 
 /// Density per solid angle of choosing the point at `distance` along the unit `wi`.
 template <class D>
 HWY_INLINE Real<D> PdfOf(D d, const SphericalTriangle<D>& t, const Vec3<D>& wi, Real<D> distance) {
-  const Real<D> even =
-      SafeDiv(d, Splat(d, 1), hn::IfThenElse(t.huge, Splat(d, 2 * kPi), t.solid_angle));
-  const Real<D> by_area =
-      SafeDiv(d, Splat(d, 2) * distance * distance, hn::Abs(Dot(t.area_normal, wi)));
-  return hn::IfThenElseZero(hn::Gt(t.solid_angle, hn::Zero(d)),
-                            hn::IfThenElse(t.tiny, by_area, even));
+  const Real<D> even = hn::IfThenElse(t.huge, Splat(d, 2 * kPi), t.solid_angle);
+  const Real<D> density =
+      SafeDiv(d, hn::IfThenElse(t.tiny, Splat(d, 2) * distance * distance, Splat(d, 1)),
+              hn::IfThenElse(t.tiny, hn::Abs(Dot(t.area_normal, wi)), even));
+  return hn::IfThenElseZero(hn::Gt(t.solid_angle, hn::Zero(d)), density);
 }
 
 /// A point of the triangle as seen from `ref`. From within the triangle's plane, or too near to it,
