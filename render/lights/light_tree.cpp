@@ -4,6 +4,7 @@
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -167,6 +168,15 @@ double AddPunctual(stages::LightTables& tables, std::span<const PunctualInput> p
   return illuminance;
 }
 
+int16_t ToFixed(double multiple) {
+  return static_cast<int16_t>(std::clamp(multiple, -32767.0, 32767.0));
+}
+/// The upper half of the value's bits; `carry` is added to the lower half before: 0xffff rounds
+/// away from zero, 0x7fff to the nearest.
+uint16_t UpperHalf(double value, uint32_t carry) {
+  return static_cast<uint16_t>((std::bit_cast<uint32_t>(static_cast<float>(value)) + carry) >> 16);
+}
+
 class TreeBuilder {
  public:
   explicit TreeBuilder(stages::LightTables& tables) : tables_(tables) {}
@@ -177,6 +187,7 @@ class TreeBuilder {
     for (const LightCluster& light : lights) power += light.power;
     for (LightCluster& light : lights) light.power /= power;
     tables_.nodes.resize(2 * lights.size());
+    tables_.parents.resize(lights.size());
     LightCluster root = BuildNode(lights, 0, stages::kNone, 2, 0);
     root.power = power;
     return root;
@@ -218,17 +229,17 @@ class TreeBuilder {
     double largest = 0;
     for (int i = 0; i < 3; ++i) {
       n.center[i] = static_cast<float>(center[i]);
-      n.axis[i] = static_cast<float>(c.axis[i]);
+      n.axis[i] = ToFixed(std::round(c.axis[i] * stages::kFixedOne));
       largest = std::max(largest, std::abs(center[i]));
     }
     // Outward, past the rounding of the centre and of the radius itself.
-    n.radius = static_cast<float>(c.radius > 0 ? c.radius * (1 + 1e-6) + largest * 2e-7 : 0);
-    n.signed_power = static_cast<float>(c.two_sided ? -c.power : c.power);
-    n.cos_theta_o = static_cast<float>(std::cos(c.theta_o));
-    n.sin_theta_o = std::sqrt(std::max(std::fma(-n.cos_theta_o, n.cos_theta_o, 1.0f), 0.0f));
-    n.cos_theta_e = static_cast<float>(std::cos(std::min(c.theta_e, kPi)));
+    n.radius = UpperHalf(c.radius > 0 ? c.radius * (1 + 1e-6) + largest * 2e-7 : 0, 0xffff);
+    n.signed_power = UpperHalf(c.two_sided ? -c.power : c.power, 0x7fff);
+    n.cos_theta_o = ToFixed(std::floor(std::cos(c.theta_o) * stages::kFixedOne));
+    n.sin_theta_o = ToFixed(std::ceil(std::sin(c.theta_o) * stages::kFixedOne));
+    n.cos_theta_e = ToFixed(std::floor(std::cos(std::min(c.theta_e, kPi)) * stages::kFixedOne));
     n.child_or_light = child_or_light;
-    n.parent = parent;
+    if (node % 2 == 0) tables_.parents[static_cast<size_t>(node) / 2] = parent;
   }
 
   stages::LightTables& tables_;
@@ -274,6 +285,7 @@ void BuildLightTree(stages::SceneTables& scene, std::span<const TriangleEmission
   stages::LightTables& tables = scene.lights;
   tables.lights.clear();
   tables.nodes.clear();
+  tables.parents.clear();
   tables.infinite_lights.clear();
   tables.lights.reserve(triangles.size() + punctual.size());
   std::vector<LightCluster> clusters;

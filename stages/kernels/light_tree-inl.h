@@ -42,9 +42,10 @@ HWY_INLINE Receiver<D> MakeReceiver(D d, const Vec3<D>& position, const Vec3<D>&
   return {position, normal, hn::Not(hn::Gt(Dot(normal, normal), hn::Zero(d)))};
 }
 
-// Bounds come from rounded numbers, so nothing is culled by less than this difference of cosines,
-// and what is not culled keeps at least this share of its unoccluded, perpendicular importance.
-constexpr double kCullMargin = 1e-3;
+// Bounds come from rounded numbers, axes from 16 bits (the angle from them, near 0 or pi, is off by
+// up to 0.008). So nothing is culled by less than this difference of cosines, and what is not
+// culled keeps at least this share of its unoccluded, perpendicular importance.
+constexpr double kCullMargin = 1e-2;
 constexpr double kLeastEmission = 1e-3;
 // Receivers below the horizon of a shading normal may still take light (transmission, bump maps).
 constexpr double kLeastReception = 0.02;
@@ -64,18 +65,41 @@ struct NodeLanes {
 };
 template <class D>
 HWY_INLINE NodeLanes<D> LoadNode(D d, const LightNode* nodes, Int<D> node) {
+  const IntTag<D> di;
   const Quad<D> sphere = FieldQuad(d, nodes, node, offsetof(LightNode, center));
-  const Quad<D> emission = FieldQuad(d, nodes, node, offsetof(LightNode, axis));
-  const Quad<D> rest = FieldQuad(d, nodes, node, offsetof(LightNode, cos_theta_o));
+  const Int<D> shape =
+      QuadInt(d, nodes, node, offsetof(LightNode, cos_theta_e), sphere.w);  // and radius
+  const IntQuad<D> rest = FieldIntQuad(d, nodes, node, offsetof(LightNode, axis));
+  const Int<D> upper_half = hn::Set(di, static_cast<int32_t>(0xffff0000));
+  const Real<D> unit = Splat(d, 1 / kFixedOne);
   NodeLanes<D> lanes;
   lanes.center = {sphere.x, sphere.y, sphere.z};
-  lanes.radius = sphere.w;
-  lanes.axis = {emission.x, emission.y, emission.z};
-  lanes.signed_power = emission.w;
-  lanes.o = {rest.x, rest.y};
-  lanes.cos_e = rest.z;
-  lanes.child_or_light = QuadInt(d, nodes, node, offsetof(LightNode, child_or_light), rest.w);
+  lanes.radius = RealOfBits(d, hn::And(shape, upper_half));
+  lanes.cos_e = LowerHalf(d, shape) * unit;
+  lanes.axis = {LowerHalf(d, rest.x) * unit, UpperHalf(d, rest.x) * unit,
+                LowerHalf(d, rest.y) * unit};
+  lanes.o = {UpperHalf(d, rest.y) * unit, LowerHalf(d, rest.z) * unit};
+  lanes.signed_power = RealOfBits(d, hn::And(rest.z, upper_half));
+  lanes.child_or_light = rest.w;
   return lanes;
+}
+static_assert(offsetof(LightNode, radius) == offsetof(LightNode, cos_theta_e) + 2 &&
+              offsetof(LightNode, cos_theta_o) == offsetof(LightNode, axis) + 6 &&
+              offsetof(LightNode, sin_theta_o) == offsetof(LightNode, axis) + 8 &&
+              offsetof(LightNode, signed_power) == offsetof(LightNode, axis) + 10 &&
+              offsetof(LightNode, child_or_light) == offsetof(LightNode, axis) + 12);
+
+/// The same node in all lanes.
+template <class D>
+HWY_INLINE NodeLanes<D> SameNode(D d, const LightNode& node) {
+  const auto fixed = [&](int16_t value) HWY_ATTR { return Splat(d, FromFixed(value)); };
+  return {Splat3(d, node.center[0], node.center[1], node.center[2]),
+          {fixed(node.axis[0]), fixed(node.axis[1]), fixed(node.axis[2])},
+          Splat(d, FromUpperHalf(node.radius)),
+          Splat(d, FromUpperHalf(node.signed_power)),
+          {fixed(node.cos_theta_o), fixed(node.sin_theta_o)},
+          fixed(node.cos_theta_e),
+          hn::Set(IntTag<D>(), node.child_or_light)};
 }
 
 /// Cosine bound of the emitters' normals: 0 where nothing of the cluster can shine towards the
@@ -186,56 +210,24 @@ struct Descent {
   Receiver<D> receiver;
   Refill<D> refill;
   LightPick<D> pick;  // of lanes that are no longer active: the result
-  Int<D> child;
+  Int<D> child;       // of active lanes: the left one of the pair that is compared next
   Mask<D> active;
 };
-
-template <class D>
-HWY_INLINE Descent<D> StartDescent(D d, const LightView& view, Mask<D> active,
-                                   const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
-  const IntTag<D> di;
-  const Mask<D> none = hn::Lt(u, u);
-  Descent<D> descent = {MakeReceiver(d, position, normal),
-                        Refill<D>::Make(d, position, u),
-                        {hn::Set(di, kNone), hn::IfThenElseZero(active, Splat(d, 1)), u},
-                        hn::Zero(di),
-                        active};
-  if (view.uniform_count > 0) {
-    descent.pick = PickUniform(d, view, active, u);
-    descent.active = none;
-  } else if (view.node_count == 0) {
-    descent.pick.probability = hn::Zero(d);
-    descent.active = none;
-  } else {
-    descent.child = FieldInt(d, view.nodes, hn::Zero(di), offsetof(LightNode, child_or_light));
-  }
-  return descent;
-}
 
 /// Asks for the pairs that the lanes will compare next.
 template <class D>
 HWY_INLINE void PrefetchPairs(D, const LightNode* nodes, Int<D> pairs) {
   HWY_ALIGN int32_t at[hn::MaxLanes(D())];
   hn::Store(pairs, IntTag<D>(), at);
-  for (const int32_t pair : at) {
-    __builtin_prefetch(&nodes[pair]);
-    __builtin_prefetch(&nodes[pair + 1]);
-  }
+  for (const int32_t pair : at) __builtin_prefetch(&nodes[pair]);
 }
 
-/// One level down, in the lanes that are active.
+/// To the pair's left or right node, in the lanes that are active; to its light, if it is a leaf.
 template <class D>
-HWY_INLINE void Descend(D d, const LightView& view, Descent<D>& to) {
+HWY_INLINE void Choose(D d, const LightView& view, const NodeLanes<D>& left,
+                       const NodeLanes<D>& right, Descent<D>& to) {
   const IntTag<D> di;
   const Int<D> zero = hn::Zero(di);
-  const Mask<D> leaf = hn::And(to.active, ToMask(d, hn::Lt(to.child, zero)));
-  to.pick.light = hn::IfThenElse(ToIntMask(d, leaf), hn::Not(to.child), to.pick.light);
-  to.active = hn::AndNot(leaf, to.active);
-  if (hn::AllFalse(d, to.active)) return;
-
-  const Int<D> pair = hn::IfThenElseZero(ToIntMask(d, to.active), to.child);
-  const NodeLanes<D> left = LoadNode(d, view.nodes, pair);
-  const NodeLanes<D> right = LoadNode(d, view.nodes, pair + hn::Set(di, 1));
   const Real<D> left_importance = Importance(d, left, to.receiver);
   const Real<D> right_importance = Importance(d, right, to.receiver);
   const Real<D> sum = left_importance + right_importance;
@@ -254,6 +246,46 @@ HWY_INLINE void Descend(D d, const LightView& view, Descent<D>& to) {
   const Real<D> remapped = hn::Min(SafeDiv(d, refilled, q), Splat(d, kLargestBelowOne));
   to.pick.u_remapped = hn::IfThenElse(to.active, remapped, u);
   to.pick.probability = hn::IfThenElse(to.active, to.pick.probability * q, to.pick.probability);
+
+  const Mask<D> leaf = hn::And(to.active, ToMask(d, hn::Lt(to.child, zero)));
+  to.pick.light = hn::IfThenElse(ToIntMask(d, leaf), hn::Not(to.child), to.pick.light);
+  to.active = hn::AndNot(leaf, to.active);
+}
+
+/// One level down, in the lanes that are active.
+template <class D>
+HWY_INLINE void Descend(D d, const LightView& view, Descent<D>& to) {
+  const IntTag<D> di;
+  const Int<D> pair = hn::IfThenElseZero(ToIntMask(d, to.active), to.child);
+  Choose(d, view, LoadNode(d, view.nodes, pair), LoadNode(d, view.nodes, pair + hn::Set(di, 1)),
+         to);
+}
+
+/// At the pair below the root, if it is not the root that is the only light.
+template <class D>
+HWY_INLINE Descent<D> StartDescent(D d, const LightView& view, Mask<D> active,
+                                   const Vec3<D>& position, const Vec3<D>& normal, Real<D> u) {
+  const IntTag<D> di;
+  const Mask<D> none = hn::Lt(u, u);
+  Descent<D> descent = {MakeReceiver(d, position, normal),
+                        Refill<D>::Make(d, position, u),
+                        {hn::Set(di, kNone), hn::IfThenElseZero(active, Splat(d, 1)), u},
+                        hn::Zero(di),
+                        active};
+  if (view.uniform_count > 0) {
+    descent.pick = PickUniform(d, view, active, u);
+    descent.active = none;
+  } else if (view.node_count == 0) {
+    descent.pick.probability = hn::Zero(d);
+    descent.active = none;
+  } else if (const int32_t child = view.nodes[0].child_or_light; child < 0) {
+    descent.pick.light =
+        hn::IfThenElse(ToIntMask(d, active), hn::Set(di, ~child), descent.pick.light);
+    descent.active = none;
+  } else if (!hn::AllFalse(d, active)) {
+    Choose(d, view, SameNode(d, view.nodes[child]), SameNode(d, view.nodes[child + 1]), descent);
+  }
+  return descent;
 }
 
 /// A light for every active lane.
@@ -289,7 +321,7 @@ HWY_INLINE Real<D> PickProbability(D d, const LightView& view, Mask<D> active,
     const Real<D> left_importance = Importance(d, left, receiver);
     const Real<D> right_importance = Importance(d, right, receiver);
     const auto is_left = hn::Eq(here, pair);
-    const Int<D> parent = FieldInt(d, view.nodes, pair, offsetof(LightNode, parent));
+    const Int<D> parent = GatherInt(d, view.parents, hn::ShiftRight<1>(pair));
     active = hn::And(active, ToMask(d, hn::Gt(parent, hn::Set(di, kNone))));
     const Mask<D> dark = hn::Not(hn::Gt(left_importance + right_importance, hn::Zero(d)));
     const Real<D> p = LeftProbability(d, left_importance, right_importance);

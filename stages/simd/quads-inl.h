@@ -162,6 +162,25 @@ HWY_INLINE Int<D> QuadInt(D d, const Record* base, Int<D> index, size_t offset, 
   }
 }
 
+/// The float whose bits these are.
+template <class D>
+HWY_INLINE Real<D> RealOfBits(D d, Int<D> bits) {
+  if constexpr (kReference<D>) {
+    return hn::PromoteTo(d, hn::BitCast(hn::Rebind<float, D>(), bits));
+  } else {
+    return hn::BitCast(d, bits);
+  }
+}
+/// The lower and the upper 16 bits, which are signed.
+template <class D>
+HWY_INLINE Real<D> LowerHalf(D d, Int<D> bits) {
+  return hn::ConvertTo(d, hn::ShiftRight<16>(hn::ShiftLeft<16>(bits)));
+}
+template <class D>
+HWY_INLINE Real<D> UpperHalf(D d, Int<D> bits) {
+  return hn::ConvertTo(d, hn::ShiftRight<16>(bits));
+}
+
 }  // namespace carpool::stages::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

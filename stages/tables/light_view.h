@@ -31,10 +31,11 @@ inline EnvironmentView ViewOf(const Environment& environment) {
 struct LightView {
   const Light* lights = nullptr;
   const LightNode* nodes = nullptr;
+  const int32_t* parents = nullptr;
   const int32_t* infinite_lights = nullptr;
   int32_t node_count = 0;
   int32_t infinite_count = 0;
-  int32_t uniform_count = 0;  // > 0: the tree is not asked, all so many lights are chosen alike
+  int32_t uniform_count = 0;   // > 0: the tree is not asked, all so many lights are chosen alike
   float tree_probability = 0;  // see LightTables
   float infinite_probability = 0;
   float environment_probability = 0;
@@ -53,6 +54,7 @@ inline LightView LightViewOf(const SceneTables& scene) {
   LightView view;
   view.lights = lights.lights.data();
   view.nodes = lights.nodes.data();
+  view.parents = lights.parents.data();
   view.infinite_lights = lights.infinite_lights.data();
   view.node_count = static_cast<int32_t>(lights.nodes.size());
   view.infinite_count = static_cast<int32_t>(lights.infinite_lights.size());

@@ -54,22 +54,34 @@ struct alignas(64) Light {
 };
 static_assert(sizeof(Light) == 64);
 
-/// A node of the light tree: a cluster of lights. 16 words. The root is node 0; node 1 is unused,
-/// so that siblings are a pair (2k, 2k + 1) and each finds the other by flipping the lowest bit.
-struct alignas(64) LightNode {
-  float center[3] = {0, 0, 0};  // sphere around everything that emits
-  float radius = 0;
-  float axis[3] = {0, 0, 1};  // cone of emission normals (Conty Estevez & Kulla 2018)
-  float signed_power = 0;     // candela of luminance, summed, as a share of the whole tree's;
-                              // negative: the cone's opposite counts as well (two-sided emitters)
-  float cos_theta_o = 1;      // bound on the angle between an emitter's normal and the axis
-  float sin_theta_o = 0;
-  float cos_theta_e = 0;        // bound on the emission angle about a normal
+/// A cosine, sine or component of a direction as a multiple of 1 / kFixedOne, in 16 bits.
+constexpr float kFixedOne = 32767;
+constexpr float FromFixed(int16_t value) {
+  return static_cast<float>(value) / kFixedOne;
+}
+/// The upper half of a float: its sign, exponent and 7 bits of mantissa (bfloat16).
+constexpr float FromUpperHalf(uint16_t upper) {
+  return std::bit_cast<float>(static_cast<uint32_t>(upper) << 16);
+}
+
+/// A node of the light tree: a cluster of lights. 8 words, so that siblings share a cache line. The
+/// root is node 0; node 1 is unused, so that siblings are a pair (2k, 2k + 1) and each finds the
+/// other by flipping the lowest bit.
+struct alignas(32) LightNode {
+  float center[3] = {0, 0, 0};  // sphere around everything that emits ...
+  int16_t cos_theta_e = 0;      // bound on the emission angle about a normal, rounded down
+  uint16_t radius = 0;          // ... upper half, rounded up
+  int16_t axis[3] = {0, 0, 0};  // cone of emission normals (Conty Estevez & Kulla 2018)
+  int16_t cos_theta_o = 0;  // bound on the angle between an emitter's normal and the axis: rounded
+  int16_t sin_theta_o = 0;  // down, and up
+  uint16_t signed_power = 0;  // upper half of candela of luminance, summed, as a share of the whole
+                              // tree's; negative: the cone's opposite counts as well (two-sided
+                              // emitters)
   int32_t child_or_light = -1;  // inner: the left child, the right one follows it; leaf: ~light
-  int32_t parent = -1;          // -1 at the root
-  int32_t pad[3] = {};
 };
-static_assert(sizeof(LightNode) == 64);
+static_assert(sizeof(LightNode) == 32);
+// Kernels take two halves from one word.
+static_assert(std::endian::native == std::endian::little);
 
 /// Selection masses of an environment table are integers whose sum is this: the grid of a 24-bit
 /// float in [0, 1), so that a table is inverted without any rounding.
@@ -106,6 +118,8 @@ struct Environment {
 struct LightTables {
   HugeVector<Light> lights;     // triangle lights first, in placement order; then punctual ones
   HugeVector<LightNode> nodes;  // depth-first; empty: no light in the tree
+  HugeVector<int32_t>
+      parents;  // of each pair of nodes: the parent of 2k and 2k + 1; -1 at the root
   std::vector<int32_t> infinite_lights;  // indices of directional lights
   Environment environment;
   float tree_probability = 0;         // of choosing the tree, each infinite light, the environment:

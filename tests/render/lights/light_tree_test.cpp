@@ -66,6 +66,26 @@ double Distance(const float a[3], const float b[3]) {
   return std::hypot(double{a[0]} - b[0], double{a[1]} - b[1], double{a[2]} - b[2]);
 }
 
+float Power(const LightNode& n) {
+  return stages::FromUpperHalf(n.signed_power);
+}
+double ConeAngle(const LightNode& n) {
+  return std::acos(double{stages::FromFixed(n.cos_theta_o)});
+}
+double AngleBetween(const LightNode& a, const LightNode& b) {
+  double sine = 0, cosine = 0;
+  for (int i = 0; i < 3; ++i) {
+    const int k = (i + 1) % 3;
+    const double cross = 1.0 * a.axis[i] * b.axis[k] - 1.0 * a.axis[k] * b.axis[i];
+    sine += cross * cross;
+    cosine += 1.0 * a.axis[i] * b.axis[i];
+  }
+  return std::atan2(std::sqrt(sine), cosine);
+}
+// Of the angle between axes in 16 bits, and of a cone about one that is all but a line: rounding
+// its cosine by 2^-15 opens it by this.
+const double kRounding = std::acos(1 - 0x1p-15) + 1e-3;
+
 /// Checks the subtree at `node`; returns its number of leaves and deepens `depth` to the deepest.
 int CheckSubtree(const stages::LightTables& tables, int32_t node, int level, int& depth) {
   const LightNode& n = tables.nodes[static_cast<size_t>(node)];
@@ -79,19 +99,18 @@ int CheckSubtree(const stages::LightTables& tables, int32_t node, int level, int
   float power = 0;
   for (int32_t child = n.child_or_light; child < n.child_or_light + 2; ++child) {
     const LightNode& c = tables.nodes[static_cast<size_t>(child)];
-    EXPECT_EQ(c.parent, node);
+    EXPECT_EQ(tables.parents[static_cast<size_t>(child) / 2], node);
     EXPECT_LE(n.cos_theta_e, c.cos_theta_e);
-    EXPECT_TRUE(n.signed_power < 0 || c.signed_power > 0);
+    EXPECT_TRUE(Power(n) < 0 || Power(c) > 0);
     // The child's cone is within the parent's, or its opposite if that counts.
-    double cos = 0;
-    for (int i = 0; i < 3; ++i) cos += double{c.axis[i]} * n.axis[i];
-    if (n.signed_power < 0) cos = std::abs(cos);
-    const double outermost = std::acos(std::clamp(cos, -1.0, 1.0)) + std::acos(c.cos_theta_o);
-    EXPECT_LE(std::min(outermost, std::acos(-1.0)), std::acos(n.cos_theta_o) + 1e-3);
-    power += std::abs(c.signed_power);
+    double between = AngleBetween(c, n);
+    if (Power(n) < 0) between = std::min(between, std::acos(-1.0) - between);
+    const double outermost = between + ConeAngle(c);
+    EXPECT_LE(std::min(outermost, std::acos(-1.0)), ConeAngle(n) + kRounding);
+    power += std::abs(Power(c));
     leaves += CheckSubtree(tables, child, level + 1, depth);
   }
-  EXPECT_NEAR(power / std::abs(n.signed_power), 1, 1e-5);
+  EXPECT_NEAR(power / std::abs(Power(n)), 1, 0x1p-7);  // each has 8 bits
   return leaves;
 }
 
@@ -99,8 +118,9 @@ int CheckSubtree(const stages::LightTables& tables, int32_t node, int level, int
 void CheckAncestors(const stages::LightTables& tables, size_t light, const float point[3]) {
   for (int32_t node = tables.lights[light].leaf; node >= 0;) {
     const LightNode& n = tables.nodes[static_cast<size_t>(node)];
-    ASSERT_LE(Distance(point, n.center), n.radius) << "light " << light << ", node " << node;
-    node = n.parent;
+    ASSERT_LE(Distance(point, n.center), stages::FromUpperHalf(n.radius))
+        << "light " << light << ", node " << node;
+    node = tables.parents[static_cast<size_t>(node) / 2];
   }
 }
 
@@ -118,8 +138,9 @@ TEST(LightTreeBuild, EveryLightHasOneLeafAndEveryClusterHoldsItsOwn) {
   int depth = 0;
   EXPECT_EQ(CheckSubtree(scene.lights, 0, 0, depth), 5000);
   EXPECT_EQ(scene.lights.nodes.size(), 10000u);
-  EXPECT_EQ(scene.lights.nodes[0].parent, -1);
-  EXPECT_NEAR(std::abs(scene.lights.nodes[0].signed_power), 1, 1e-6);
+  EXPECT_EQ(scene.lights.parents.size(), 5000u);
+  EXPECT_EQ(scene.lights.parents[0], -1);
+  EXPECT_EQ(std::abs(Power(scene.lights.nodes[0])), 1);
   EXPECT_LT(depth, 33 + 13);
 }
 
