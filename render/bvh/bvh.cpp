@@ -111,6 +111,7 @@ ScenePtr Bvh::BuildMesh(const SceneTables& scene, const PlacementPlan::Instanced
 void Bvh::BuildLevel(Level& level, const SceneTables& scene, const PlacementPlan& plan,
                      bool transparent, bool robust) {
   ScenePtr top = NewScene(device_.get(), robust);
+  level.top.push_back(stages::kNone);  // of rays that hit nothing
   for (const PlacementPlan::Flat& flat : plan.flat) {
     const Placement& p = scene.geometry.placements[flat.placement];
     if (IsTransparent(scene, p) != transparent) continue;
@@ -145,7 +146,7 @@ void Bvh::BuildLevel(Level& level, const SceneTables& scene, const PlacementPlan
       level.nested.push_back(instance.first_placement + member);
   }
 
-  if (level.top.empty()) return;
+  if (level.top.size() == 1) return;
   rtcCommitScene(top.get());
   const RTCError error = rtcGetDeviceError(device_.get());
   if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
@@ -156,7 +157,7 @@ void Bvh::BuildLevel(Level& level, const SceneTables& scene, const PlacementPlan
 
 stages::TraceView Bvh::View() const {
   const auto view = [](const Level& level) {
-    return TraceLevel{level.scene.get(), level.top.data(), level.nested.data()};
+    return TraceLevel{level.scene.get(), level.top.data() + 1, level.nested.data()};
   };
   return {view(opaque_), view(transparent_), stages::ViewOf(geometry_),
           stages::NativePacketSize(device_.get())};

@@ -100,11 +100,6 @@ void SetRay(RTCRay& ray, const float origin[3], const float direction[3], float 
   ray.flags = 0;
 }
 
-int32_t PlacementOf(const TraceLevel& level, unsigned instance, unsigned geometry) {
-  if (instance == RTC_INVALID_GEOMETRY_ID) return level.top[geometry];
-  return level.nested[level.top[instance] + static_cast<int32_t>(geometry)];
-}
-
 float LayerReach(const PathState& path) {
   return Reach(path.origin, path.first_layer.distance);
 }

@@ -30,8 +30,11 @@ struct LayerHit {
 
 void SetRay(RTCRay& ray, const float origin[3], const float direction[3], float tnear, float tfar);
 
-/// The placement of a hit on geometry `geometry` of `instance` (or of none).
-int32_t PlacementOf(const TraceLevel& level, unsigned instance, unsigned geometry);
+/// The placement of a hit on geometry `geometry` of `instance` (or of none); kNone of no hit.
+inline int32_t PlacementOf(const TraceLevel& level, unsigned instance, unsigned geometry) {
+  if (instance == RTC_INVALID_GEOMETRY_ID) return level.top[static_cast<int32_t>(geometry)];
+  return level.nested[level.top[instance] + static_cast<int32_t>(geometry)];
+}
 
 /// Half the length of a place around the path's first hit there: some ulps of the coordinates that
 /// the intersection went through.

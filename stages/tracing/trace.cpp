@@ -60,42 +60,65 @@ bool Nearest(const TraceLevel& level, RTCRayHit& ray, PathState& path) {
   return true;
 }
 
-/// The paths of one packet; idle lanes have the first one's ray.
+/// The paths of one packet. Once it is closed, idle lanes have the first one's.
 template <int kSize>
 struct Packet {
-  alignas(64) int valid[kSize] = {};
+  alignas(64) int valid[kSize];
   PathState* paths[kSize];
   int count = 0;
 
-  void Add(PathState& path) {
-    valid[count] = -1;
-    paths[count++] = &path;
+  void Add(PathState& path) { paths[count++] = &path; }
+  void Close() {
+    for (int i = 0; i < kSize; ++i) valid[i] = i < count ? -1 : 0;
+    std::fill(paths + count, paths + kSize, paths[0]);
   }
-  void Clear() {
-    std::fill_n(valid, kSize, 0);
-    count = 0;
-  }
-  const PathState& Lane(int i) const { return *paths[i < count ? i : 0]; }
 };
+
+namespace hn = hwy::HWY_NAMESPACE;
+using Four = hn::FixedTag<float, 4>;
+using FourWords = hn::Vec<Four>;
+
+/// Rows to columns, or columns to rows.
+struct Square {
+  FourWords a, b, c, e;
+};
+Square Transposed(const Square& s) {
+  const Four d;
+  const auto ac_low = hn::InterleaveLower(d, s.a, s.c), be_low = hn::InterleaveLower(d, s.b, s.e);
+  const auto ac_high = hn::InterleaveUpper(d, s.a, s.c), be_high = hn::InterleaveUpper(d, s.b, s.e);
+  return {hn::InterleaveLower(d, ac_low, be_low), hn::InterleaveUpper(d, ac_low, be_low),
+          hn::InterleaveLower(d, ac_high, be_high), hn::InterleaveUpper(d, ac_high, be_high)};
+}
+
+FourWords LoadWords(const PathState& path, size_t offset) {
+  const auto* const words = reinterpret_cast<const std::byte*>(&path) + offset;
+  return hn::Load(Four(), reinterpret_cast<const float*>(words));
+}
+void StoreWords(FourWords words, PathState& path, size_t offset) {
+  hn::Store(words, Four(), reinterpret_cast<float*>(reinterpret_cast<std::byte*>(&path) + offset));
+}
 
 /// Four neighbouring floats of each path, the first at `offset`, to four arrays.
 template <int kSize>
 void Transpose(const Packet<kSize>& packet, size_t offset, float* x, float* y, float* z, float* w) {
-  namespace hn = hwy::HWY_NAMESPACE;
-  const hn::FixedTag<float, 4> d;
+  const Four d;
   for (int i = 0; i < kSize; i += 4) {
-    const auto load = [&](int k) {
-      const auto* const path = reinterpret_cast<const std::byte*>(&packet.Lane(i + k));
-      return hn::Load(d, reinterpret_cast<const float*>(path + offset));
-    };
-    const auto a = load(0), b = load(1), c = load(2), e = load(3);
-    const auto ac_low = hn::InterleaveLower(d, a, c), be_low = hn::InterleaveLower(d, b, e);
-    const auto ac_high = hn::InterleaveUpper(d, a, c), be_high = hn::InterleaveUpper(d, b, e);
-    hn::Store(hn::InterleaveLower(d, ac_low, be_low), d, x + i);
-    hn::Store(hn::InterleaveUpper(d, ac_low, be_low), d, y + i);
-    hn::Store(hn::InterleaveLower(d, ac_high, be_high), d, z + i);
-    hn::Store(hn::InterleaveUpper(d, ac_high, be_high), d, w + i);
+    const auto load = [&](int k) { return LoadWords(*packet.paths[i + k], offset); };
+    const Square columns = Transposed({load(0), load(1), load(2), load(3)});
+    hn::Store(columns.a, d, x + i);
+    hn::Store(columns.b, d, y + i);
+    hn::Store(columns.c, d, z + i);
+    hn::Store(columns.e, d, w + i);
   }
+}
+
+/// What all packets of rays have in common; queries leave it alone.
+template <int kSize, class Rays>
+void SetCommon(Rays& rays) {
+  std::fill_n(rays.time, kSize, 0.0f);
+  std::fill_n(rays.mask, kSize, ~0u);
+  std::iota(rays.id, rays.id + kSize, 0u);
+  std::fill_n(rays.flags, kSize, 0u);
 }
 
 /// The packet's rays: from the paths' origins, along the directions at `direction`. The float
@@ -104,48 +127,84 @@ template <int kSize, class Rays>
 void SetRays(Rays& rays, const Packet<kSize>& packet, size_t direction, float* behind) {
   Transpose(packet, offsetof(PathState, origin), rays.org_x, rays.org_y, rays.org_z, rays.tnear);
   Transpose(packet, direction, rays.dir_x, rays.dir_y, rays.dir_z, behind);
-  std::fill_n(rays.time, kSize, 0.0f);
-  std::fill_n(rays.mask, kSize, ~0u);
-  std::iota(rays.id, rays.id + kSize, 0u);
-  std::fill_n(rays.flags, kSize, 0u);
 }
 static_assert(offsetof(PathState, tnear) == offsetof(PathState, origin) + 12 &&
               offsetof(PathState, shadow_distance) == offsetof(PathState, shadow_direction) + 12);
 
-template <int kSize, class RayHits>
-void NearestOfPacket(const TraceLevel& level, const Packet<kSize>& packet, RayHits& rays,
-                     Coherence coherence) {
-  if (level.scene == nullptr) return;
-  for (int i = 0; i < kSize; ++i) {
-    rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-    rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+/// What the rays of a packet hit; u, v and the distance are Embree's.
+template <int kSize>
+struct PacketHits {
+  typename EmbreePacket<kSize>::RayHit rays;
+  alignas(16) int32_t placement[kSize];
+
+  PacketHits() { SetCommon<kSize>(rays.ray); }
+  void Trace(const TraceLevel& level, const Packet<kSize>& packet, Coherence coherence) {
+    std::fill_n(rays.hit.geomID, kSize, RTC_INVALID_GEOMETRY_ID);
+    std::fill_n(rays.hit.instID[0], kSize, RTC_INVALID_GEOMETRY_ID);
+    EmbreeIntersect<kSize>(packet.valid, level.scene, &rays, coherence);
   }
-  EmbreeIntersect<kSize>(packet.valid, level.scene, &rays, coherence);
-  for (int i = 0; i < packet.count; ++i) {
-    if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-    PathState& path = *packet.paths[i];
-    path.placement = PlacementOf(level, rays.hit.instID[0][i], rays.hit.geomID[i]);
-    path.primitive = rays.hit.primID[i];
-    path.u = rays.hit.u[i];
-    path.v = rays.hit.v[i];
-    path.distance = rays.ray.tfar[i];
+};
+
+/// Writes the hits to the paths, and marks them as the first at their place.
+template <int kSize>
+void StoreHits(const PacketHits<kSize>& hits, const Packet<kSize>& packet) {
+  const Four d;
+  const hn::RebindToSigned<Four> di;
+  const auto& hit = hits.rays.hit;
+  for (int i = 0; i < packet.count; i += 4) {
+    const auto placement = hn::BitCast(d, hn::Load(di, hits.placement + i));
+    const auto primitive =
+        hn::BitCast(d, hn::Load(di, reinterpret_cast<const int32_t*>(hit.primID + i)));
+    const auto distance = hn::Load(d, hits.rays.ray.tfar + i);
+    const Square rows =
+        Transposed({primitive, hn::Load(d, hit.u + i), hn::Load(d, hit.v + i), distance});
+    const Square marks = Transposed({placement, primitive, distance, hn::Zero(d)});
+    const auto store = [&](int k, FourWords row, FourWords mark) {
+      if (i + k >= packet.count) return;
+      PathState& path = *packet.paths[i + k];
+      path.placement = hits.placement[i + k];
+      StoreWords(row, path, offsetof(PathState, primitive));
+      StoreWords(mark, path, offsetof(PathState, first_layer));
+    };
+    store(0, rows.a, marks.a);
+    store(1, rows.b, marks.b);
+    store(2, rows.c, marks.c);
+    store(3, rows.e, marks.e);
   }
 }
+static_assert(offsetof(PathState, distance) == offsetof(PathState, primitive) + 12 &&
+              offsetof(PathState, shadow_distance) == offsetof(PathState, first_layer) + 12);
 
 /// Finds the nearest hits of the packet's rays.
 template <int kSize>
-void IntersectPacket(const TraceView& view, const Packet<kSize>& packet, Coherence coherence) {
-  typename EmbreePacket<kSize>::RayHit rays;
+void IntersectPacket(const TraceView& view, const Packet<kSize>& packet, Coherence coherence,
+                     PacketHits<kSize>& hits) {
+  auto& rays = hits.rays;
   SetRays(rays.ray, packet, offsetof(PathState, direction), rays.ray.tfar);
   std::fill_n(rays.ray.tfar, kSize, kInfinity);  // over what is behind the direction
-  for (int i = 0; i < packet.count; ++i) packet.paths[i]->placement = kNone;
-  NearestOfPacket(view.opaque, packet, rays, coherence);
-  NearestOfPacket(view.transparent, packet, rays, coherence);
+  std::fill_n(rays.hit.primID, kSize, 0u);  // of rays that miss: nobody reads it, but it is copied
+  std::fill_n(rays.hit.u, kSize, 0.0f);
+  std::fill_n(rays.hit.v, kSize, 0.0f);
+  std::fill_n(hits.placement, kSize, kNone);
+  if (view.opaque.scene != nullptr) {
+    hits.Trace(view.opaque, packet, coherence);
+    for (int i = 0; i < packet.count; ++i)
+      hits.placement[i] = PlacementOf(view.opaque, rays.hit.instID[0][i], rays.hit.geomID[i]);
+  }
+  if (view.transparent.scene != nullptr) {
+    hits.Trace(view.transparent, packet, coherence);
+    for (int i = 0; i < packet.count; ++i) {
+      if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+      hits.placement[i] = PlacementOf(view.transparent, rays.hit.instID[0][i], rays.hit.geomID[i]);
+    }
+  }
+  StoreHits(hits, packet);
 }
 
 template <int kSize>
 void IntersectSlots(const TraceView& view, PathState* paths, std::span<const uint32_t> slots) {
   Packet<kSize> packet;
+  PacketHits<kSize> hits;
   TriangleName left[kSize];
   for (size_t i = 0; i < slots.size(); ++i) {
     if (i + kSize < slots.size()) PrefetchPath(&paths[slots[i + kSize]]);
@@ -155,9 +214,20 @@ void IntersectSlots(const TraceView& view, PathState* paths, std::span<const uin
       packet.Add(path);
     }
     if (packet.count < kSize && i + 1 < slots.size()) continue;
-    if (packet.count > 0) IntersectPacket(view, packet, Coherence::incoherent);
-    for (int k = 0; k < packet.count; ++k) FinishTracing(view, left[k], *packet.paths[k]);
-    packet.Clear();
+    if (packet.count == 0) return;
+    packet.Close();
+    IntersectPacket(view, packet, Coherence::incoherent, hits);
+    unsigned same = 0;
+    for (int k = 0; k < packet.count; ++k) {
+      const bool again =
+          (hits.placement[k] == left[k].placement) & (hits.rays.hit.primID[k] == left[k].primitive);
+      same |= static_cast<unsigned>(again) << k;
+    }
+    for (; same != 0; same &= same - 1) {
+      const int k = __builtin_ctz(same);
+      FinishTracing(view, left[k], *packet.paths[k]);
+    }
+    packet.count = 0;
   }
 }
 
@@ -182,15 +252,18 @@ bool IsOther(const TraceView& view, const PathState& path, const RTCHit& hit) {
 
 void AddShadowed(const TraceView& view, const OpacityQuery& opacity, bool occluded,
                  PathState& path) {
+  const Four d;
   const float through = occluded ? 0 : Transmittance(view, opacity, path);
-  for (int c = 0; c < 3; ++c) path.radiance[c] += through * path.shadow_radiance[c];
+  const FourWords before = LoadWords(path, offsetof(PathState, radiance));
+  const FourWords added = LoadWords(path, offsetof(PathState, shadow_radiance));
+  const FourWords sum = hn::Add(before, hn::Mul(hn::Set(d, through), added));
+  StoreWords(hn::IfThenElse(hn::FirstN(d, 3), sum, before), path, offsetof(PathState, radiance));
   path.shadow_distance = 0;
 }
 
 template <int kSize>
 void TracePacketShadows(const TraceView& view, const OpacityQuery& opacity,
-                        const Packet<kSize>& packet) {
-  typename EmbreePacket<kSize>::Ray rays;
+                        const Packet<kSize>& packet, typename EmbreePacket<kSize>::Ray& rays) {
   SetRays(rays, packet, offsetof(PathState, shadow_direction), rays.tfar);
   std::fill_n(rays.tnear, kSize, 0.0f);
   if (view.opaque.scene != nullptr) {
@@ -207,12 +280,15 @@ template <int kSize>
 void TraceSlotShadows(const TraceView& view, const OpacityQuery& opacity, PathState* paths,
                       std::span<const uint32_t> slots) {
   Packet<kSize> packet;
+  typename EmbreePacket<kSize>::Ray rays;
+  SetCommon<kSize>(rays);
   for (size_t i = 0; i < slots.size(); ++i) {
     if (i + kSize < slots.size()) PrefetchPath(&paths[slots[i + kSize]]);
     packet.Add(paths[slots[i]]);
     if (packet.count < kSize && i + 1 < slots.size()) continue;
-    TracePacketShadows(view, opacity, packet);
-    packet.Clear();
+    packet.Close();
+    TracePacketShadows(view, opacity, packet, rays);
+    packet.count = 0;
   }
 }
 
@@ -224,6 +300,9 @@ void IntersectPath(const TraceView& view, PathState& path) {
   RTCRayHit ray;
   SetRay(ray.ray, path.origin, path.direction, path.tnear, kInfinity);
   path.placement = kNone;
+  path.primitive = 0;
+  path.u = path.v = 0;
+  path.distance = kInfinity;
   Nearest(view.opaque, ray, path);
   Nearest(view.transparent, ray, path);
   FinishTracing(view, left, path);
@@ -239,8 +318,9 @@ void IntersectPacket(const TraceView& view, PathState* const paths[8]) {
     if (paths[i] != nullptr) packet.Add(*paths[i]);
   }
   if (packet.count == 0) return;
-  IntersectPacket(view, packet, Coherence::coherent);
-  for (int i = 0; i < packet.count; ++i) MarkFirstLayer(*packet.paths[i]);
+  packet.Close();
+  PacketHits<8> hits;
+  IntersectPacket(view, packet, Coherence::coherent, hits);
 }
 
 void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& path) {

@@ -11,7 +11,8 @@
 namespace carpool::stages {
 
 /// One Embree scene and the way from its hits to placements: a hit on a flat geometry g is
-/// placement `top[g]`; a hit on geometry g of instance i is placement `nested[top[i] + g]`.
+/// placement `top[g]`; a hit on geometry g of instance i is placement `nested[top[i] + g]`. Before
+/// the first entry stands kNone, top[-1]: where a ray hit nothing, Embree's number is ~0.
 struct TraceLevel {
   RTCScene scene = nullptr;  // null: empty
   const int32_t* top = nullptr;
