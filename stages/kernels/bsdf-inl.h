@@ -119,13 +119,18 @@ HWY_INLINE void PrepareDiffuse(D d, const SchlickTerm<D>& dielectric,
 }
 
 /// What PrepareBsdf makes, to the bit, of lanes that have neither metal nor an interface that
-/// reflects: all that it multiplies by zero is left out.
+/// reflects: all that it multiplies by zero is left out, and what lobes of no weight do not read
+/// is not set.
 template <class D>
 HWY_INLINE Bsdf<D> PrepareMatte(D d, const BsdfTablesView& tables, const Vec3<D>& base) {
-  Bsdf<D> bsdf = {};
+  Bsdf<D> bsdf;
   bsdf.tables = tables;
   bsdf.matte = true;
+  bsdf.SpecularLobe<D>::weight = hn::Zero(d);
+  bsdf.MultiScatterLobe<D>::weight = hn::Zero(d);
   bsdf.DiffuseLobe<D>::through = Splat(d, 1);
+  bsdf.DiffuseLobe<D>::through_m = hn::Zero(d);
+  bsdf.DiffuseLobe<D>::through_b = hn::Zero(d);
   bsdf.DiffuseLobe<D>::diffuse = base;
   bsdf.DiffuseLobe<D>::weight = SumComponents<D>(base);
   bsdf.SumWeights(d);

@@ -55,31 +55,41 @@ HWY_INLINE Mask<D> AtLeast(D d, Uint<D> depth, uint32_t least) {
 template <class D>
 struct Vertex {
   PathLanes<D> path;
-  Int<D> primitive;
   Uint<D> depth;   // scattering events before this one
   Uint<D> number;  // of the vertex in the table of sample dimensions: the camera is 0
-  Uint<D> flags;
   SampleKey<D> key;
-  SurfacePoint<D> at;
-  Surface<D> surface;
+  TexturePoint<D> at;
   TextureFootprint<D> footprint;
   Real<D> cone_width;   // of the ray cone, here ...
   Real<D> cone_spread;  // ... and its growth per metre on the way
   Vec3<D> toward;       // to the previous vertex
-  Vec3<D> ray_origin;
-  Real<D> ray_pdf;
-  Real<D> distance;
   Vec3<D> throughput;
-  Vec3<D> radiance;  // of the path so far, updated by the steps
+  Vec3<D> radiance;   // of the path so far, updated by the steps
+  Vec3<D> origin;     // of rays that leave
+  Vec3<D> geometric;  // unit normals: of the triangle ...
+  Vec3<D> shading;    // ... and interpolated, bent by the normal map
+};
+
+/// What only the first step needs of it: a vertex lies in memory between the steps.
+template <class D>
+struct Arrival {
+  Int<D> primitive;
+  Uint<D> flags;
+  SurfacePoint<D> at;
+  Triangle<D> triangle;
+  Surface<D> surface;
+  Vec3<D> ray_origin;
+  Real<D> ray_pdf, distance;
 };
 
 template <class D>
-HWY_INLINE TextureFootprint<D> MakeFootprint(D d, const KernelContext& c, const Vertex<D>& v) {
+HWY_INLINE TextureFootprint<D> MakeFootprint(D d, const KernelContext& c, const Vertex<D>& v,
+                                             Real<D> twice_area) {
   const TextureTriangle<D> uvs = GatherTextureTriangle(d, c, v.at, hn::Zero(IntTag<D>()));
   // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter
   // takes care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and
   // blur).
-  const Real<D> density = SafeDiv(d, TwiceTextureArea<D>(uvs), v.surface.twice_area);
+  const Real<D> density = SafeDiv(d, TwiceTextureArea<D>(uvs), twice_area);
   const Real<D> least = Splat(d, 1e-30);  // a camera inside a surface, a shape without coordinates
   return {TextureCoordinates<D>(v.at, uvs),
           hn::MulAdd(FastLog2(d, hn::Max(density, least)), Splat(d, 0.5),
@@ -88,7 +98,8 @@ HWY_INLINE TextureFootprint<D> MakeFootprint(D d, const KernelContext& c, const 
 }
 
 template <class D>
-HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>& p) {
+HWY_INLINE void LoadVertex(D d, const KernelContext& c, const PathLanes<D>& p, Vertex<D>& v,
+                           Arrival<D>& a) {
   const UintTag<D> du;
   const IntTag<D> di;
   const Quad<D> origin = PathQuad(d, p, offsetof(PathState, origin));       // and tnear
@@ -98,50 +109,52 @@ HWY_INLINE Vertex<D> LoadVertex(D d, const KernelContext& c, const PathLanes<D>&
   const Quad<D> names =
       PathQuad(d, p, offsetof(PathState, pixel));  // pixel, sample, flags, placement
   const Quad<D> hit = PathQuad(d, p, offsetof(PathState, primitive));  // primitive, u, v, distance
-  Vertex<D> v;
   v.path = p;
-  v.flags = hn::BitCast(du, names.z);
-  v.depth = hn::And(v.flags, hn::Set(du, kPathDepthMask));
+  a.flags = hn::BitCast(du, names.z);
+  v.depth = hn::And(a.flags, hn::Set(du, kPathDepthMask));
   v.number = v.depth + hn::Set(du, 1);
   v.key = MakeSampleKey(d, hn::BitCast(du, names.x), hn::BitCast(du, names.y), c.seed);
-  v.ray_origin = {origin.x, origin.y, origin.z};
-  v.ray_pdf = ray.w;
-  v.distance = hit.w;
+  a.ray_origin = {origin.x, origin.y, origin.z};
+  a.ray_pdf = ray.w;
+  a.distance = hit.w;
   v.throughput = {through.x, through.y, through.z};
   v.radiance = {gathered.x, gathered.y, gathered.z};
   v.cone_spread = gathered.w;
   const Vec3<D> direction = {ray.x, ray.y, ray.z};
   v.toward = Neg<D>(direction);
 
-  v.primitive = hn::BitCast(di, hit.x);
-  v.at = MakeSurfacePoint(d, c, hn::BitCast(di, names.w), v.primitive, hit.y, hit.z);
-  v.surface = MakeSurface(d, c, v.at, direction);
+  a.primitive = hn::BitCast(di, hit.x);
+  a.at = MakeSurfacePoint(d, c, hn::BitCast(di, names.w), a.primitive, hit.y, hit.z);
+  v.at = a.at;
+  a.triangle = TriangleVertices(d, c.geometry, a.at.placement, a.at.index);
+  a.surface = MakeSurface(d, c, a.at, a.triangle, direction);
+  v.geometric = a.surface.geometric;
 
-  v.cone_width = hn::MulAdd(v.cone_spread, v.distance, through.w);
+  v.cone_width = hn::MulAdd(v.cone_spread, a.distance, through.w);
   if (MayHaveTextures(v.at.material)) {
-    v.footprint = MakeFootprint(d, c, v);
+    v.footprint = MakeFootprint(d, c, v, a.surface.twice_area);
   } else {  // nothing will be read
     v.footprint = {{hn::Zero(d), hn::Zero(d)}, hn::Zero(d), hn::Zero(d)};
   }
-  return v;
 }
 
 /// Lanes that go straight on: transparent by chance of their alpha, or seen from behind by the
 /// camera where the material is single-sided. (Later rays see both sides: a wall must not leak
 /// light.)
 template <class D>
-HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, Real<D> alpha, Mask<D> active) {
+HWY_INLINE Mask<D> PassesThrough(D d, const Vertex<D>& v, const Arrival<D>& a, Real<D> alpha,
+                                 Mask<D> active) {
   const UintTag<D> du;
   Mask<D> transparent = hn::Lt(alpha, alpha);  // never
   if (MayBeTransparent(v.at.material)) {
     const Uint<D> layers =
-        hn::ShiftRight<kPathLayerShift>(hn::And(v.flags, hn::Set(du, kPathLayerMask)));
+        hn::ShiftRight<kPathLayerShift>(hn::And(a.flags, hn::Set(du, kPathLayerMask)));
     const Real<D> u = HashUniform(d, v.key, v.number, Purpose::alpha, layers);
     transparent = hn::Ge(u, Opacity(d, v.at, alpha));
   }
   const Mask<D> camera_ray = hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(du)));
   const Mask<D> double_sided = MaterialHas(d, v.at.material, kMaterialDoubleSided);
-  const Mask<D> culled = hn::And(hn::AndNot(double_sided, v.surface.back), camera_ray);
+  const Mask<D> culled = hn::And(hn::AndNot(double_sided, a.surface.back), camera_ray);
   return hn::And(active, hn::Or(transparent, culled));
 }
 
@@ -163,11 +176,12 @@ HWY_INLINE void SetNext(D d, Mask<D> lanes, Next value, Next* next) {
 /// The same ray goes on: what it hits next at the same place, or behind, is for tracing to find.
 /// Past the largest number of layers the path ends.
 template <class D>
-HWY_INLINE void ContinueThrough(D d, const Vertex<D>& v, Mask<D> passes, Next* next) {
+HWY_INLINE void ContinueThrough(D d, const PathLanes<D>& p, Uint<D> flags_before, Mask<D> passes,
+                                Next* next) {
   const UintTag<D> du;
   const IntTag<D> di;
-  const Uint<D> flags = v.flags + hn::Set(du, 1u << kPathLayerShift);
-  StoreWord(d, PathTargets<D>(d, v.path, passes), offsetof(PathState, flags), flags);
+  const Uint<D> flags = flags_before + hn::Set(du, 1u << kPathLayerShift);
+  StoreWord(d, PathTargets<D>(d, p, passes), offsetof(PathState, flags), flags);
   constexpr int32_t kMost = static_cast<int32_t>(kMaxAlphaLayers << kPathLayerShift);
   const Int<D> layers = hn::BitCast(di, hn::And(flags, hn::Set(du, kPathLayerMask)));
   const auto goes_on = hn::Lt(layers, hn::Set(di, kMost));
@@ -176,13 +190,13 @@ HWY_INLINE void ContinueThrough(D d, const Vertex<D>& v, Mask<D> passes, Next* n
 
 /// What the AOVs want of the first hit.
 template <class D>
-HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v,
-                               const Vec3<D>& albedo, const Vec3<D>& normal, Mask<D> active) {
+HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v, Real<D> distance,
+                               const Vec3<D>& albedo, Mask<D> active) {
   const Mask<D> first = hn::And(active, hn::RebindMask(d, hn::Eq(v.depth, hn::Zero(UintTag<D>()))));
   if (hn::AllFalse(d, first)) return;
   HWY_ALIGN float words[7][hn::MaxLanes(D())];
-  const Real<D> values[7] = {albedo.x, albedo.y, albedo.z,  normal.x,
-                             normal.y, normal.z, v.distance};
+  const Real<D> values[7] = {albedo.x,    albedo.y,    albedo.z, v.shading.x,
+                             v.shading.y, v.shading.z, distance};
   for (int i = 0; i < 7; ++i) hn::Store(values[i], d, words[i]);
   HWY_ALIGN int32_t slots[hn::MaxLanes(D())];
   hn::Store(v.path.slot, IntTag<D>(), slots);
@@ -202,30 +216,31 @@ HWY_INLINE void RecordFirstHit(D d, const KernelContext& c, const Vertex<D>& v,
 
 /// Emission of the surface that was hit, weighted against light sampling from the previous vertex.
 template <class D>
-HWY_INLINE void AddEmission(D d, const KernelContext& c, Vertex<D>& v, Mask<D> active) {
+HWY_INLINE void AddEmission(D d, const KernelContext& c, const Arrival<D>& a, Vertex<D>& v,
+                            Mask<D> active) {
   const Mask<D> front =
-      hn::Or(hn::Not(v.surface.back), MaterialHas(d, v.at.material, kMaterialDoubleSided));
+      hn::Or(hn::Not(a.surface.back), MaterialHas(d, v.at.material, kMaterialDoubleSided));
   active = hn::And(hn::And(active, front), MaterialHas(d, v.at.material, kMaterialEmissive));
   if (hn::AllFalse(d, active)) return;
 
   const Vec3<D> emitted = EmittedRadiance(d, c, v.at, v.footprint.uv, active);
   Real<D> weight = Splat(d, 1);
   const IntTag<D> di;
-  const Int<D> first_light = v.at.placement.first_light;
+  const Int<D> first_light = a.at.placement.first_light;
   const Mask<D> sampled =
-      hn::And(hn::And(active, IsPresent(d, first_light)), hn::Gt(v.ray_pdf, hn::Zero(d)));
+      hn::And(hn::And(active, IsPresent(d, first_light)), hn::Gt(a.ray_pdf, hn::Zero(d)));
   if (!hn::AllFalse(d, sampled)) {
-    const Int<D> light = hn::IfThenElseZero(hn::RebindMask(di, sampled), first_light + v.primitive);
+    const Int<D> light = hn::IfThenElseZero(hn::RebindMask(di, sampled), first_light + a.primitive);
     const Vec3<D> normal =
         DecodeNormal(d, hn::BitCast(UintTag<D>(), PathInt(d, v.path, offsetof(PathState, normal))));
-    const Triangle<D>& t = v.surface.triangle;
+    const Triangle<D>& t = a.triangle;
     const Real<D> pdf =
-        lights::LightPdfForTriangleHit(d, c.lights, sampled, v.ray_origin, normal, light, t.p0,
-                                       t.p1, t.p2, Neg<D>(v.toward), v.distance);
+        lights::LightPdfForTriangleHit(d, c.lights, sampled, a.ray_origin, normal, light, t.p0,
+                                       t.p1, t.p2, Neg<D>(v.toward), a.distance);
     if (c.probe != nullptr) c.probe->emission_light_pdf = static_cast<float>(hn::GetLane(pdf));
     // What light sampling never finds has no other strategy, whichever is asked for.
     const Mask<D> findable = hn::And(sampled, hn::Gt(pdf, hn::Zero(d)));
-    weight = hn::IfThenElse(findable, StrategyWeight(d, c, DirectSampling::bsdf, v.ray_pdf, pdf),
+    weight = hn::IfThenElse(findable, StrategyWeight(d, c, DirectSampling::bsdf, a.ray_pdf, pdf),
                             weight);
   }
   if (c.probe != nullptr) c.probe->emission_weight = static_cast<float>(hn::GetLane(weight));
@@ -273,10 +288,9 @@ HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const lights::Li
                    light.radiance_or_irradiance);
 }
 
-/// The next vertex's start and the shading frame here, shared by light and BSDF sampling.
+/// The shading frame and the lobes there, shared by light and BSDF sampling.
 template <class D>
 struct Scatter {
-  Vec3<D> origin;
   Uint<D> packed_normal;
   Frame<D> frame;
   Vec3<D> wo;  // local
@@ -295,10 +309,10 @@ template <class D>
 HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& v,
                                   const Scatter<D>& s, const lights::LightChoice<D>& choice,
                                   Mask<D> active) {
-  const lights::LightSample<D> light = lights::SampleChosen(d, c.lights, active, choice, s.origin);
+  const lights::LightSample<D> light = lights::SampleChosen(d, c.lights, active, choice, v.origin);
   const Real<D> zero = hn::Zero(d);
-  Mask<D> wanted = hn::And(hn::And(active, hn::Gt(light.pdf, zero)),
-                           hn::Gt(Dot(light.wi, v.surface.geometric), zero));
+  Mask<D> wanted =
+      hn::And(hn::And(active, hn::Gt(light.pdf, zero)), hn::Gt(Dot(light.wi, v.geometric), zero));
   ShadowRay<D> shadow = {light.wi, Splat3(d, 0, 0, 0), light.distance, wanted};
   if (hn::AllFalse(d, wanted)) return shadow;
 
@@ -319,11 +333,11 @@ HWY_INLINE ShadowRay<D> NextEvent(D d, const KernelContext& c, const Vertex<D>& 
   // light never shadows itself: a wall as close to the light as 2^-19 (distance + largest
   // coordinates of both ends), or to its plane as 2^-20 of the distance to its farthest corner, is
   // missed.
-  const Vec3<D> end = MulAdd(light.wi, light.distance, s.origin);
+  const Vec3<D> end = MulAdd(light.wi, light.distance, v.origin);
   const auto most = [](const Vec3<D>& a) HWY_ATTR {
     return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
   };
-  const Real<D> ends = (light.distance + most(s.origin) + most(end)) * Splat(d, 0x1p-19);
+  const Real<D> ends = (light.distance + most(v.origin) + most(end)) * Splat(d, 0x1p-19);
   const Real<D> margin = hn::MulAdd(light.distance, light.blur, ends);
   const Mask<D> near_light = hn::Lt(light.distance, Splat(d, 1e29));
   shadow.distance = hn::IfThenElse(near_light, light.distance - margin, light.distance);
@@ -360,7 +374,7 @@ HWY_INLINE Bounce<D> SampleBounce(D d, const KernelContext& c, const Vertex<D>& 
   b.throughput = Mul<D>(v.throughput, sample.weight);
   b.pdf = sample.pdf;
   b.alive = hn::And(hn::And(active, sample.valid),
-                    hn::And(hn::Gt(Dot(b.direction, v.surface.geometric), hn::Zero(d)),
+                    hn::And(hn::Gt(Dot(b.direction, v.geometric), hn::Zero(d)),
                             hn::Gt(MaxComponent(b.throughput), hn::Zero(d))));
 
   const Mask<D> roulette = hn::And(b.alive, AtLeast(d, v.depth, c.roulette_depth));
@@ -397,7 +411,7 @@ HWY_INLINE void StoreVertex(D d, const Vertex<D>& v, const Scatter<D>& s,
       hn::Or(v.depth + hn::Set(du, 1),
              hn::IfThenElseZero(hn::RebindMask(du, bounce.alive), hn::Set(du, kPathAlive)));
   const Real<D> shadow_distance = hn::IfThenElseZero(shadow.wanted, shadow.distance);
-  StoreQuad(d, to, offsetof(PathState, origin), s.origin.x, s.origin.y, s.origin.z, zero);
+  StoreQuad(d, to, offsetof(PathState, origin), v.origin.x, v.origin.y, v.origin.z, zero);
   StoreQuad(d, to, offsetof(PathState, direction), bounce.direction.x, bounce.direction.y,
             bounce.direction.z, bounce.pdf);
   StoreQuad(d, to, offsetof(PathState, throughput), bounce.throughput.x, bounce.throughput.y,
@@ -441,29 +455,30 @@ template <class D>
 HWY_INLINE void Arrive(D d, const KernelContext& c, const PathLanes<D>& p, Shading<D>& w,
                        Next* next) {
   Vertex<D>& v = w.v;
-  v = LoadVertex(d, c, p);
-  const Rgba<D> base = BaseColor(d, c, v.at, v.footprint, p.active);
+  Arrival<D> a;
+  LoadVertex(d, c, p, v, a);
+  const Rgba<D> base = BaseColor(d, c, a.at, v.footprint, p.active);
   w.base_color = base.rgb;
   w.ended = true;
 
-  const Mask<D> passes = PassesThrough(d, v, base.a, p.active);
-  if (!hn::AllFalse(d, passes)) ContinueThrough(d, v, passes, next);
+  const Mask<D> passes = PassesThrough(d, v, a, base.a, p.active);
+  if (!hn::AllFalse(d, passes)) ContinueThrough(d, p, a.flags, passes, next);
   Mask<D> active = hn::AndNot(passes, p.active);
   if (hn::AllFalse(d, active)) return;
 
-  v.surface.shading = MappedNormal(d, c, v.at, v.surface, v.footprint, active);
-  v.surface.shading = FaceViewer(d, v.surface.shading, v.toward);
-  if (c.first_hits) RecordFirstHit(d, c, v, base.rgb, v.surface.shading, active);
+  v.shading = FaceViewer(d, MappedNormal(d, c, a.at, a.surface, v.footprint, active), v.toward);
+  if (c.first_hits) RecordFirstHit(d, c, v, a.distance, base.rgb, active);
 
   const Mask<D> unlit = hn::And(active, MaterialHas(d, v.at.material, kMaterialUnlit));
   v.radiance = Select<D>(unlit, Add<D>(v.radiance, Mul<D>(v.throughput, base.rgb)), v.radiance);
-  AddEmission(d, c, v, hn::AndNot(unlit, active));
+  AddEmission(d, c, a, v, hn::AndNot(unlit, active));
 
   const Mask<D> deep = AtLeast(d, v.depth, c.max_depth);
   const Mask<D> ends = hn::And(active, hn::Or(unlit, deep));
   if (!hn::AllFalse(d, ends)) EndPaths(d, v, ends, next);
   w.active = hn::AndNot(ends, active);
   w.ended = hn::AllFalse(d, w.active);
+  v.origin = OffsetOrigin(d, a.surface);
 }
 
 /// The frame and the lobes there.
@@ -471,9 +486,8 @@ template <class D>
 HWY_INLINE void Prepare(D d, const KernelContext& c, Shading<D>& w) {
   const Vertex<D>& v = w.v;
   Scatter<D>& s = w.s;
-  s.origin = OffsetOrigin(d, v.surface);
-  s.packed_normal = EncodeNormal(d, v.surface.shading);
-  s.frame = MakeFrame(d, v.surface.shading);
+  s.packed_normal = EncodeNormal(d, v.shading);
+  s.frame = MakeFrame(d, v.shading);
   s.wo = ToLocal(s.frame, v.toward);
   s.bsdf = PrepareBsdf(d, c.bsdf, MaterialParams(d, c, v, w.base_color, w.active), s.wo);
 }
@@ -483,7 +497,7 @@ HWY_INLINE void BeginChoice(D d, const KernelContext& c, Shading<D>& w) {
   const Real<D> u_pick = Sample1D(d, w.v.key, w.v.number, Purpose::light_pick);
   const Vec2<D> u_point = Sample2D(d, w.v.key, w.v.number, Purpose::light_point);
   const Vec3<D> normal = DecodeNormal(d, w.s.packed_normal);
-  lights::BeginChoice(d, c.lights, w.active, w.s.origin, normal, u_pick, u_point, w.choice);
+  lights::BeginChoice(d, c.lights, w.active, w.v.origin, normal, u_pick, u_point, w.choice);
 }
 
 template <class D>

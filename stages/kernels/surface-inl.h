@@ -21,13 +21,18 @@
 HWY_BEFORE_NAMESPACE();
 namespace carpool::stages::HWY_NAMESPACE {
 
-/// A point on a triangle of the scene, by barycentrics of vertices 1 and 2.
+/// A point on a triangle, by barycentrics of its vertices, as far as reading textures needs it.
 template <class D>
-struct SurfacePoint {
-  PlacementLanes<D> placement;
+struct TexturePoint {
   Records<Material, D> material;
+  Int<D> uvs, uv_sets;  // of the placement
   TriangleIndices<D> index;
   Real<D> b0, b1, b2;
+};
+/// The same of the scene.
+template <class D>
+struct SurfacePoint : TexturePoint<D> {
+  PlacementLanes<D> placement;
 };
 
 template <class D>
@@ -35,18 +40,14 @@ HWY_INLINE SurfacePoint<D> MakeSurfacePoint(D d, const KernelContext& c, Int<D> 
                                             Int<D> primitive, Real<D> b1, Real<D> b2) {
   const Real<D> b0 = hn::Max(Splat(d, 1) - b1 - b2, hn::Zero(d));
   const PlacementLanes<D> lanes = LoadPlacements(d, c.geometry.placements, placement);
-  return {lanes,
-          MakeRecords(d, c.materials, lanes.material),
-          GatherTriangleIndices(d, c.geometry, lanes, primitive),
-          b0,
-          b1,
-          b2};
+  return {{MakeRecords(d, c.materials, lanes.material), lanes.uvs, lanes.uv_sets,
+           GatherTriangleIndices(d, c.geometry, lanes, primitive), b0, b1, b2},
+          lanes};
 }
 
 /// The shape of the surface at a hit. Normals face the side that the ray came from.
 template <class D>
 struct Surface {
-  Triangle<D> triangle;
   Vec3<D> position;   // recomputed from barycentrics
   Vec3<D> error;      // componentwise bound on its distance to the triangle that Embree sees
   Vec3<D> geometric;  // unit normal of the triangle
@@ -57,11 +58,11 @@ struct Surface {
 
 /// The value at the point of what the vertices have.
 template <class D>
-HWY_INLINE Real<D> Interpolate(const SurfacePoint<D>& at, Real<D> v0, Real<D> v1, Real<D> v2) {
+HWY_INLINE Real<D> Interpolate(const TexturePoint<D>& at, Real<D> v0, Real<D> v1, Real<D> v2) {
   return hn::MulAdd(at.b0, v0, hn::MulAdd(at.b1, v1, at.b2 * v2));
 }
 template <class D>
-HWY_INLINE Vec3<D> Interpolate(const SurfacePoint<D>& at, const Vec3<D>& v0, const Vec3<D>& v1,
+HWY_INLINE Vec3<D> Interpolate(const TexturePoint<D>& at, const Vec3<D>& v0, const Vec3<D>& v1,
                                const Vec3<D>& v2) {
   return {Interpolate<D>(at, v0.x, v1.x, v2.x), Interpolate<D>(at, v0.y, v1.y, v2.y),
           Interpolate<D>(at, v0.z, v1.z, v2.z)};
@@ -122,12 +123,9 @@ HWY_INLINE Vec3<D> PositionError(D d, const Records<Placement, D>& placement, Ma
 
 template <class D>
 HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoint<D>& at,
-                                  const Vec3<D>& ray_direction) {
-  const Triangle<D> t = TriangleVertices(d, c.geometry, at.placement, at.index);
+                                  const Triangle<D>& t, const Vec3<D>& ray_direction) {
   const Mask<D> instanced = PlacementHas(d, at.placement, kPlacementInstanced);
-
   Surface<D> s;
-  s.triangle = t;
   s.position = MulAdd(t.p1, at.b1, MulAdd(t.p2, at.b2, Scale(t.p0, at.b0)));
   s.error = PositionError(d, at.placement.record, instanced, t);
 
@@ -165,9 +163,9 @@ struct TextureTriangle {
 };
 template <class D>
 HWY_INLINE TextureTriangle<D> GatherTextureTriangle(D d, const KernelContext& c,
-                                                    const SurfacePoint<D>& at, Int<D> set) {
+                                                    const TexturePoint<D>& at, Int<D> set) {
   const IntTag<D> di;
-  const Int<D> uvs = at.placement.uvs, sets = at.placement.uv_sets;
+  const Int<D> uvs = at.uvs, sets = at.uv_sets;
   TextureTriangle<D> t;
   t.present = hn::And(IsPresent(d, uvs), hn::RebindMask(d, hn::Lt(set, sets)));
   if (hn::AllFalse(d, t.present)) {
@@ -188,12 +186,12 @@ HWY_INLINE TextureTriangle<D> GatherTextureTriangle(D d, const KernelContext& c,
 
 /// Texture coordinates of the point; (0, 0) where the shape has none.
 template <class D>
-HWY_INLINE Vec2<D> TextureCoordinates(const SurfacePoint<D>& at, const TextureTriangle<D>& t) {
+HWY_INLINE Vec2<D> TextureCoordinates(const TexturePoint<D>& at, const TextureTriangle<D>& t) {
   return {hn::IfThenElseZero(t.present, Interpolate<D>(at, t.v0.x, t.v1.x, t.v2.x)),
           hn::IfThenElseZero(t.present, Interpolate<D>(at, t.v0.y, t.v1.y, t.v2.y))};
 }
 template <class D>
-HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const SurfacePoint<D>& at,
+HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const TexturePoint<D>& at,
                                       Int<D> set) {
   return TextureCoordinates<D>(at, GatherTextureTriangle(d, c, at, set));
 }
@@ -229,7 +227,7 @@ HWY_INLINE bool MayBeTransparent(const Records<Material, D>& material) {
 
 /// Reads one texture slot of each lane's material; `absent` where the material has none.
 template <class D>
-HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const SurfacePoint<D>& at,
+HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const TexturePoint<D>& at,
                                    const TextureFootprint<D>& footprint, Slot which, Mask<D> active,
                                    double absent) {
   const IntTag<D> di;
@@ -284,7 +282,7 @@ HWY_INLINE Rgba<D> BaseColor(D d, const KernelContext& c, const SurfacePoint<D>&
 
 /// How much of the surface is there, by alphaMode: 1, a step at the cutoff, or alpha itself.
 template <class D>
-HWY_INLINE Real<D> Opacity(D d, const SurfacePoint<D>& at, Real<D> alpha) {
+HWY_INLINE Real<D> Opacity(D d, const TexturePoint<D>& at, Real<D> alpha) {
   const IntTag<D> di;
   const Int<D> mode = FieldInt(d, at.material, offsetof(Material, alpha_mode));
   const auto is = [&](AlphaMode m) HWY_ATTR {
@@ -301,7 +299,7 @@ HWY_INLINE Real<D> Opacity(D d, const SurfacePoint<D>& at, Real<D> alpha) {
 /// Emitted radiance at a point, always from the finest mip level: seen directly, reached by BSDF
 /// sampling and by light sampling it is the same function, as MIS needs.
 template <class D>
-HWY_INLINE Vec3<D> EmittedRadiance(D d, const KernelContext& c, const SurfacePoint<D>& at,
+HWY_INLINE Vec3<D> EmittedRadiance(D d, const KernelContext& c, const TexturePoint<D>& at,
                                    const Vec2<D>& uv, Mask<D> active) {
   const TextureFootprint<D> finest = {uv, Splat(d, -100), hn::Zero(d)};
   const Rgba<D> texel = MaterialTexture(d, c, at, finest, Slot::emissive, active, 1);

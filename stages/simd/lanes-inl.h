@@ -143,14 +143,25 @@ HWY_INLINE Real<D> SafeDiv(D d, Real<D> a, Real<D> b) {
   const Mask<D> ok = hn::Gt(b, hn::Zero(d));
   return hn::IfThenElseZero(ok, a / hn::IfThenElse(ok, b, Splat(d, 1)));
 }
+/// Brings a normal x > 0, whose inverse is normal too, to 1 (double) or, a power of two, into [1,
+/// 2).
+template <class D>
+HWY_INLINE Real<D> ScaleToOne(D d, Real<D> x) {
+  if constexpr (sizeof(hn::TFromD<D>) != 4) {
+    return Splat(d, 1) / x;
+  } else {
+    const IntTag<D> di;
+    const Int<D> exponent = hn::And(hn::BitCast(di, x), hn::Set(di, 0x7f800000));
+    return hn::BitCast(d, hn::Set(di, 254 << 23) - exponent);
+  }
+}
 /// a / |a|; a zero or non-finite length gives `fallback`. Scaled by the largest component first, so
 /// that lengths from 1e-37 to 1e37 neither underflow nor overflow when squared.
 template <class D>
 HWY_INLINE Vec3<D> SafeNormalize(D d, const Vec3<D>& a, const Vec3<D>& fallback) {
   const Real<D> largest = hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
   Mask<D> ok = hn::And(hn::Gt(largest, Splat(d, 1e-37)), hn::Lt(largest, Splat(d, 1e37)));
-  const Real<D> scale = Splat(d, 1) / hn::IfThenElse(ok, largest, Splat(d, 1));
-  const Vec3<D> b = Scale(a, scale);
+  const Vec3<D> b = Scale(a, ScaleToOne(d, hn::IfThenElse(ok, largest, Splat(d, 1))));
   ok = hn::And(ok, hn::Gt(Dot(b, b), hn::Zero(d)));  // false for a NaN that Max let through
   const Real<D> inverse = Splat(d, 1) / hn::Sqrt(hn::IfThenElse(ok, Dot(b, b), Splat(d, 1)));
   return Select<D>(ok, Scale(b, inverse), fallback);
