@@ -141,10 +141,10 @@ void SetRay(RTCRay& ray, const RecordedRay& r) {
 }
 
 void ReplayBounce(const stages::TraceView& view, const RecordedRay& r) {
-  for (RTCScene scene : {view.opaque.scene, view.transparent.scene}) {
+  RTCRayHit hit;
+  SetRay(hit.ray, r);
+  for (RTCScene scene : {view.opaque.scene, view.transparent.scene}) {  // the second up to the hit
     if (scene == nullptr) continue;
-    RTCRayHit hit;
-    SetRay(hit.ray, r);
     hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     stages::EmbreeIntersect1(scene, &hit);
@@ -194,10 +194,10 @@ void InPackets(const RecordedRay* rays, size_t count, const Trace& trace) {
 template <int kSize>
 void ReplayBouncePackets(const stages::TraceView& view, const RecordedRay* rays, size_t count) {
   InPackets<kSize>(rays, count, [&](const RecordedRay* first, size_t some, const int* valid) {
+    typename stages::EmbreePacket<kSize>::RayHit hits;
+    SetRays<kSize>(hits.ray, first, some);
     for (RTCScene scene : {view.opaque.scene, view.transparent.scene}) {
       if (scene == nullptr) continue;
-      typename stages::EmbreePacket<kSize>::RayHit hits;
-      SetRays<kSize>(hits.ray, first, some);
       std::fill_n(hits.hit.geomID, kSize, RTC_INVALID_GEOMETRY_ID);
       std::fill_n(hits.hit.instID[0], kSize, RTC_INVALID_GEOMETRY_ID);
       stages::EmbreeIntersect<kSize>(valid, scene, &hits, stages::Coherence::incoherent);
