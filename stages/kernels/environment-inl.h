@@ -180,19 +180,29 @@ HWY_INLINE Int<D> GuideOf(D, const SelectionTables& tables, Int<D> which, Int<D>
          hn::ShiftRightSame(cell, 24 - GuideBits(tables.count));
 }
 
-/// The last entry of table `which` whose cumulative mass is not above u's cell: entries without
-/// mass share their successor's (or the end's) and are never the last.
+/// Where the guide has the search for u begin: an entry of table `which`.
 template <class D>
-HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> which, Real<D> u) {
+HWY_INLINE Int<D> GuidedEntry(D d, const SelectionTables& tables, Int<D> which, Real<D> u) {
+  return GatherInt(d, tables.guide, GuideOf(d, tables, which, CellOf(d, u)));
+}
+/// Where the masses of table `which` begin.
+template <class D>
+HWY_INLINE Int<D> MassesOf(D, const SelectionTables& tables, Int<D> which) {
+  return which * hn::Set(IntTag<D>(), tables.count + 1);
+}
+
+/// The last entry of table `which` whose cumulative mass is not above u's cell: entries without
+/// mass share their successor's (or the end's) and are never the last. `low`: GuidedEntry.
+template <class D>
+HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> which, Real<D> u,
+                                     Int<D> low) {
   const IntTag<D> di;
   const Int<D> one = hn::Set(di, 1);
   const Int<D> cell = CellOf(d, u);
-  const Int<D> cdf = which * hn::Set(di, tables.count + 1);
-  const Int<D> guide = GuideOf(d, tables, which, cell);
+  const Int<D> cdf = MassesOf(d, tables, which);
 
   // One load brings the bounds of three entries. What follows the end of a table is not looked at:
   // the end itself is above every cell.
-  Int<D> low = GatherInt(d, tables.guide, guide);
   const IntQuad<D> bounds = GatherIntQuad(d, tables.cdf, cdf + low);
   const auto first = hn::Gt(bounds.y, cell);
   const auto second = hn::Or(first, hn::Gt(bounds.z, cell));
@@ -202,6 +212,7 @@ HWY_INLINE TableEntry<D> InvertTable(D d, const SelectionTables& tables, Int<D> 
   low = low + hn::IfThenZeroElse(first, one) + hn::IfThenZeroElse(second, one);
   if (!hn::AllTrue(di, third)) {
     low = low + hn::IfThenZeroElse(third, one);
+    const Int<D> guide = GuideOf(d, tables, which, cell);
     Int<D> high = hn::IfThenElse(third, low, GatherInt(d, tables.guide, guide + one));
     for (auto open = hn::Lt(low, high); !hn::AllFalse(di, open); open = hn::Lt(low, high)) {
       const Int<D> middle = hn::ShiftRight<1>(low + high + one);
@@ -259,22 +270,37 @@ HWY_INLINE void PrefetchEach(D, const T* base, Int<D> index) {
   for (const int32_t i : at) __builtin_prefetch(base + i);
 }
 
-/// A place on the map being drawn. Its three steps each begin with look-ups all over a large table;
+/// A place on the map being drawn. Its four steps each begin with look-ups all over a large table;
 /// what a step will read is asked for at the end of the one before, so that other lanes can go
 /// through theirs meanwhile.
 template <class D>
 struct EnvironmentSearch {
   TableEntry<D> row;          // of the first step
-  EnvironmentPlace<D> place;  // of the second
+  Int<D> column;              // of the second: where the search for it begins
+  EnvironmentPlace<D> place;  // of the third
 };
+
+template <class D>
+HWY_INLINE SelectionTables ColumnsOf(D, const EnvironmentView& view) {
+  return {view.column_cdf, view.column_guide, view.width};
+}
 
 template <class D>
 HWY_INLINE void FindRow(D d, const EnvironmentView& view, const Vec2<D>& u,
                         EnvironmentSearch<D>& search) {
   const SelectionTables rows = {view.row_cdf, view.row_guide, view.height};
-  const SelectionTables columns = {view.column_cdf, view.column_guide, view.width};
-  search.row = InvertTable(d, rows, hn::Zero(IntTag<D>()), u.y);
+  const SelectionTables columns = ColumnsOf(d, view);
+  const Int<D> only = hn::Zero(IntTag<D>());
+  search.row = InvertTable(d, rows, only, u.y, GuidedEntry(d, rows, only, u.y));
   PrefetchEach(d, columns.guide, GuideOf(d, columns, search.row.index, CellOf(d, u.x)));
+}
+
+template <class D>
+HWY_INLINE void FindColumn(D d, const EnvironmentView& view, const Vec2<D>& u,
+                           EnvironmentSearch<D>& search) {
+  const SelectionTables columns = ColumnsOf(d, view);
+  search.column = GuidedEntry(d, columns, search.row.index, u.x);
+  PrefetchEach(d, columns.cdf, MassesOf(d, columns, search.row.index) + search.column);
 }
 
 /// A place with the density described above: tents are wrapped in s and reflected at the poles,
@@ -283,9 +309,8 @@ template <class D>
 HWY_INLINE void FindPlace(D d, const EnvironmentView& view, const Vec2<D>& u,
                           EnvironmentSearch<D>& search) {
   const IntTag<D> di;
-  const SelectionTables columns = {view.column_cdf, view.column_guide, view.width};
   const TableEntry<D>& row = search.row;
-  const TableEntry<D> column = InvertTable(d, columns, row.index, u.x);
+  const TableEntry<D> column = InvertTable(d, ColumnsOf(d, view), row.index, u.x, search.column);
   EnvironmentPlace<D>& place = search.place;
   place.i = WrapColumn(d, PlaceUnderTent(d, column, place.fs), view.width);
   place.j = PlaceUnderTent(d, row, place.ft);
@@ -326,13 +351,14 @@ HWY_INLINE EnvironmentSample<D> SampleFound(D d, const EnvironmentView& view,
   return {DirectionOfPlace(d, view, search.place), value.radiance, value.pdf};
 }
 
-/// All three steps.
+/// All four steps.
 template <class D>
 HWY_INLINE EnvironmentSample<D> SampleEnvironment(D d, const EnvironmentView& view,
                                                   const Vec2<D>& u) {
   if (view.width == 0) return {Splat3(d, 0, 1, 0), Splat3(d, 0, 0, 0), hn::Zero(d)};
   EnvironmentSearch<D> search;
   FindRow(d, view, u, search);
+  FindColumn(d, view, u, search);
   FindPlace(d, view, u, search);
   return SampleFound(d, view, search);
 }

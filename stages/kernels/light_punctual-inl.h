@@ -54,9 +54,12 @@ HWY_INLINE PunctualSample<D> SamplePunctual(D d, const Light* lights, Int<D> lig
                                             const Vec3<D>& ref) {
   const IntTag<D> di;
   const Int<D> type = FieldInt(d, lights, light, offsetof(Light, type));
-  const Quad<D> place = FieldQuad(d, lights, light, offsetof(Light, punctual.position));   // and range
-  const Quad<D> aim = FieldQuad(d, lights, light, offsetof(Light, punctual.direction));    // and cos_inner
-  const Quad<D> power = FieldQuad(d, lights, light, offsetof(Light, punctual.intensity));  // and cos_outer
+  const Quad<D> place =
+      FieldQuad(d, lights, light, offsetof(Light, punctual.position));  // and range
+  const Quad<D> aim =
+      FieldQuad(d, lights, light, offsetof(Light, punctual.direction));  // and cos_inner
+  const Quad<D> power =
+      FieldQuad(d, lights, light, offsetof(Light, punctual.intensity));  // and cos_outer
   const auto is = [&](LightType wanted) HWY_ATTR {
     return ToMask(d, hn::Eq(type, hn::Set(di, static_cast<int32_t>(wanted))));
   };

@@ -166,7 +166,7 @@ struct LightChoice {
   Vec2<D> u;                    // for the place on the light
   Descent<D> descent;           // of the lanes whose kind is the tree
   EnvironmentSearch<D> search;  // of those whose kind is the environment
-  bool placed;                  // is the search over?
+  int steps;                    // of the search that are still to be done
 };
 
 /// Begins to choose; `normal` is unit length on the side that takes light, or zero for a receiver
@@ -179,17 +179,18 @@ HWY_INLINE void BeginChoice(D d, const LightView& view, Mask<D> active, const Ve
   choice.u = u;
   choice.descent =
       StartDescent(d, view, choice.kind.tree, position, normal, choice.kind.u_remapped);
-  choice.placed = hn::AllFalse(d, choice.kind.environment);
-  if (!choice.placed) FindRow(d, view.environment, u, choice.search);
+  choice.steps = hn::AllFalse(d, choice.kind.environment) ? 0 : 2;
+  if (choice.steps > 0) FindRow(d, view.environment, u, choice.search);
 }
 template <class D>
 HWY_INLINE bool IsChosen(D d, const LightChoice<D>& choice) {
-  return choice.placed && hn::AllFalse(d, choice.descent.active);
+  return choice.steps == 0 && hn::AllFalse(d, choice.descent.active);
 }
 template <class D>
 HWY_INLINE void ChooseOn(D d, const LightView& view, LightChoice<D>& choice) {
-  if (!choice.placed) FindPlace(d, view.environment, choice.u, choice.search);
-  choice.placed = true;
+  if (choice.steps == 2) FindColumn(d, view.environment, choice.u, choice.search);
+  if (choice.steps == 1) FindPlace(d, view.environment, choice.u, choice.search);
+  choice.steps = choice.steps > 0 ? choice.steps - 1 : 0;
   if (!hn::AllFalse(d, choice.descent.active)) Descend(d, view, choice.descent);
 }
 
