@@ -25,8 +25,14 @@ double SeenIrradiance(double e) {
   return kRho * e / pi;
 }
 
-/// Row 26: a 2 x 2 square at height 1 gives the point below its centre E = 0.55413 pi L: four
-/// times the configuration factor of a corner's rectangle (Howell's catalogue, B-4).
+/// Configuration factor to the point below its centre of a rectangle 2 a by 2 b at height 1: four
+/// times that of a corner's (Howell's catalogue, B-4).
+double RectangleFactor(double a, double b) {
+  const double ra = std::sqrt(1 + a * a), rb = std::sqrt(1 + b * b);
+  return 2 / pi * (a / ra * std::atan(b / ra) + b / rb * std::atan(a / rb));
+}
+
+/// Row 26: a 2 x 2 square at height 1 gives the point below its centre E = 0.55413 pi L.
 ClosedForm Square(render::DirectLight direct) {
   const double radiance = 2;
   SceneCase c = OverFloor("row26_square_" + std::string(render::Name(direct)));
@@ -35,9 +41,27 @@ ClosedForm Square(render::DirectLight direct) {
   b.PlaceMesh(b.AddQuad({-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}, lamp));
   c.settings.direct = direct;
   if (direct == render::DirectLight::bsdf) c.settings.samples = 512;
-  const double root = std::sqrt(2.0);
-  const double factor = 4 / pi / root * std::atan(1 / root);
-  return {26, c, {.expected = SeenIrradiance(factor * pi * radiance)}};
+  return {26, c, {.expected = SeenIrradiance(RectangleFactor(1, 1) * pi * radiance)}};
+}
+
+/// The same square where its texture lights but the middle half: radiance is that of the point
+/// that was sampled. The mean of the texture would give 0.77 of it.
+ClosedForm StripedSquare(render::DirectLight direct) {
+  const double radiance = 2;
+  SceneCase c = OverFloor("row26_striped_square_" + std::string(render::Name(direct)));
+  SceneBuilder& b = c.scene;
+  const int stripes = b.AddTexture(4, 1, {0, 0, 0, 255, 255, 255, 255, 255, 255, 0, 0, 0},
+                                   {{"magFilter", 9728}, {"minFilter", 9728}});  // NEAREST
+  const int lamp = b.AddMaterial(
+      {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}}},
+       {"emissiveFactor", {1, 1, 1}},
+       {"emissiveTexture", {{"index", stripes}}},
+       {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", radiance}}}}}});
+  b.PlaceMesh(b.AddMesh({{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}}, {0, 1, 2, 0, 2, 3}, lamp,
+                        {{0, 0}, {1, 0}, {1, 1}, {0, 1}}));
+  c.settings.direct = direct;
+  c.settings.samples = direct == render::DirectLight::bsdf ? 1024 : 256;
+  return {26, c, {.expected = SeenIrradiance(RectangleFactor(0.5, 1) * pi * radiance)}};
 }
 
 /// Row 27: E = pi L (r/d)^2 cos. The polyhedron of 2 n meridians is inside the sphere; its outline
@@ -158,8 +182,10 @@ ClosedForm ManyLights() {
 std::vector<ClosedForm> LightForms() {
   using render::DirectLight;
   std::vector<ClosedForm> forms;
-  for (const DirectLight direct : {DirectLight::mis, DirectLight::light, DirectLight::bsdf})
+  for (const DirectLight direct : {DirectLight::mis, DirectLight::light, DirectLight::bsdf}) {
     forms.push_back(Square(direct));
+    forms.push_back(StripedSquare(direct));
+  }
   for (const double tilt : {0.0, 1.0}) forms.push_back(Sphere(tilt));
   forms.push_back(Disk());
   forms.push_back(UnderSky("one_texel", UniformSky(2)));
