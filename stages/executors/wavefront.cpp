@@ -92,7 +92,9 @@ class Wavefront final : public Executor {
   void MissKernel(const Batch<Slot>& batch, Emitter& out);
   void FilmKernel(const Batch<Slot>& batch);
 
-  void EmitTraced(std::span<const Slot> slots, Emitter& out) const;
+  auto SplitByHit(std::span<const Slot> slots) const;
+  void EmitHits(std::span<const Slot> slots, Emitter& out) const;
+  void EndPaths(std::span<const Slot> slots, uint32_t worker);
   SourceStatus ClaimPackets(SourceContext& source, Emitter& out);
 
   const KernelContext& c_;
@@ -150,10 +152,9 @@ void Wavefront::BuildGraph() {
   graph_.set_kernel(film_, [this](const Batch<Slot>& b, Emitter&) { FilmKernel(b); });
 
   graph_.add_edge(pixels, camera_);
-  for (const StageHandle<Slot>& after_trace : {shade_, film_}) {
-    graph_.add_edge(camera_, after_trace);
+  graph_.add_edge(camera_, shade_);
+  for (const StageHandle<Slot>& after_trace : {shade_, has_environment_ ? miss_ : film_})
     graph_.add_edge(intersect_, after_trace);
-  }
   for (const StageHandle<Slot>& after_shade : {intersect_, film_}) {
     graph_.add_edge(shade_, after_shade);
   }
@@ -166,18 +167,19 @@ void Wavefront::BuildGraph() {
   }
   if (has_environment_) {
     graph_.set_kernel(miss_, [this](const Batch<Slot>& b, Emitter& out) { MissKernel(b, out); });
-    graph_.add_edge(camera_, miss_);
-    graph_.add_edge(intersect_, miss_);
     graph_.add_edge(miss_, film_);
   }
 }
 
-/// Paths that hit something go to its bin, the others to the environment, if there is one.
-void Wavefront::EmitTraced(std::span<const Slot> slots, Emitter& out) const {
-  const Partition<2, kPathsAtOnce> by_hit(
+/// Traced paths that hit nothing, and those that hit something.
+auto Wavefront::SplitByHit(std::span<const Slot> slots) const {
+  return Partition<2, kPathsAtOnce>(
       slots, [&](Slot slot, size_t) { return paths_[slot].placement >= 0 ? 1 : 0; });
-  out.emit(has_environment_ ? miss_ : film_, 0, by_hit.List(0));
-  out.emit_each(by_hit.List(1), [&](Slot slot) {
+}
+
+/// Each to the bin of what it hit.
+void Wavefront::EmitHits(std::span<const Slot> slots, Emitter& out) const {
+  out.emit_each(slots, [&](Slot slot) {
     const PathState& path = paths_[slot];
     return std::pair(shade_, bins_.Of(material_of_placement_[path.placement], path.flags));
   });
@@ -223,8 +225,12 @@ void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worke
               [&](uint32_t i, uint32_t) { group[i] = &paths_[slots[next++]]; });
     IntersectPacket(c_.trace, group.data());
   }
-  EmitTraced(slots, out);
   tally.rays.camera += count;
+  // What sees the background ends at once, while its state is near: two queues less.
+  const auto by_hit = SplitByHit(slots);
+  if (has_environment_) kernels_.miss(c_, paths_.data(), by_hit.List(0));
+  EndPaths(by_hit.List(0), worker);
+  EmitHits(by_hit.List(1), out);
 }
 
 void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {
@@ -235,7 +241,9 @@ void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {
     } else {
       for (const Slot slot : some) IntersectPath(c_.trace, paths_[slot]);
     }
-    EmitTraced(some, out);
+    const auto by_hit = SplitByHit(some);
+    out.emit(has_environment_ ? miss_ : film_, 0, by_hit.List(0));
+    EmitHits(by_hit.List(1), out);
   });
   tallies_[batch.worker].rays.bounce += batch.items.size();
 }
@@ -277,9 +285,13 @@ void Wavefront::MissKernel(const Batch<Slot>& batch, Emitter& out) {
 
 void Wavefront::FilmKernel(const Batch<Slot>& batch) {
   const FlushDenormals denormals;
+  EndPaths(batch.items, batch.worker);
+}
+
+/// To the film; their slots are free then.
+void Wavefront::EndPaths(std::span<const Slot> slots, uint32_t worker) {
   constexpr size_t kAhead = 12;
   FilmAccumulator::Writer film(*c_.film);
-  const std::span<const Slot> slots = batch.items;
   for (size_t i = 0; i < slots.size(); ++i) {
     if (i + 2 * kAhead < slots.size()) PrefetchPath(&paths_[slots[i + 2 * kAhead]]);
     if (i + kAhead < slots.size()) {
@@ -289,7 +301,7 @@ void Wavefront::FilmKernel(const Batch<Slot>& batch) {
     const PathState& path = paths_[slots[i]];
     film.Add(path.pixel, path.sample, path.radiance);
   }
-  pool_.Give(batch.worker, batch.items);
+  pool_.Give(worker, slots);
 }
 
 PassReport Wavefront::Render(const CameraPass& pass, const std::atomic<bool>& stop,
