@@ -57,7 +57,8 @@ void AddFlags(CLI::App& app, Flags& flags) {
   app.add_option("--only", flags.only, "scenes with this in their name");
   app.add_option("--width", flags.bench.width, "pixels");
   app.add_option("--height", flags.bench.height, "pixels");
-  app.add_option("--samples", flags.bench.samples, "samples per pixel of one round");
+  app.add_option("--samples", flags.bench.samples,
+                 "samples per pixel of one round; 0: 4 to 16, about half a second");
   app.add_option("--rounds", flags.bench.rounds, "rounds counted, after one warm-up");
   app.add_option("--threads", flags.bench.threads, "0: all");
   app.add_option("--isa", flags.bench.isa, "sse4, avx2, avx512 or auto");

@@ -53,11 +53,11 @@ std::string SpeedChart(const std::vector<SceneFigures>& scenes) {
   for (const SceneFigures& f : scenes) {
     const bool lost = f.over_mega < 1;
     out += "<tr><td>" + Escape(f.scene.label) + "<td class=\"chart\">" +
-           Bar(f.WaveOverEmbree(), 1, lost ? "lost" : "wave") + "<br>" +
-           Bar(f.MegaOverEmbree(), 1, "mega");
-    out += Format("<td>%.2f<td>%.2f<td>%.2f<td%s>%.2fx<td>%.2f..%.2f\n", f.WaveOverEmbree(),
-                  f.MegaOverEmbree(), f.wave / f.EmbreeSingles(), lost ? " class=\"missed\"" : "",
-                  f.over_mega, f.least_over_mega, f.most_over_mega);
+           Bar(f.over_embree, 1, lost ? "lost" : "wave") + "<br>" +
+           Bar(f.mega_over_embree, 1, "mega");
+    out += Format("<td>%.2f<td>%.2f<td>%.2f<td%s>%.2fx<td>%.2f..%.2f\n", f.over_embree,
+                  f.mega_over_embree, f.over_singles, lost ? " class=\"missed\"" : "", f.over_mega,
+                  f.least_over_mega, f.most_over_mega);
   }
   return out + "</table>\n";
 }
@@ -117,8 +117,10 @@ std::string LadderTable(const render::LadderReport& ladder) {
 std::string SceneSection(const SceneFigures& f) {
   std::string out =
       "<h2>" + Escape(f.scene.label) + "</h2>\n" + RowTable(RowsOf(f), f.scene.label + ": ");
-  out += Format("<p>Memory: %.1f MiB BVH, %.1f MiB film, %.2f MiB path state and queues. ",
-                f.bvh_mebibytes, f.film_mebibytes, f.mebibytes);
+  out += Format(
+      "<p>%d samples per pixel a round. Memory: %.1f MiB BVH, %.1f MiB film, %.2f MiB path state "
+      "and queues. ",
+      f.samples, f.bvh_mebibytes, f.film_mebibytes, f.mebibytes);
   out += "The wavefront's stages in the last round:\n" + StageTable(f.schedule);
   if (f.ladder) out += LadderTable(*f.ladder);
   return out;
@@ -131,10 +133,10 @@ std::string Page(const BenchOptions& options, const std::vector<SceneFigures>& s
   std::string out = kHead;
   if (!scenes.empty()) {
     out += Format(
-        "<p>%d threads, %s, %dx%d, %d samples per pixel; medians of %d rounds, in each of which "
+        "<p>%d threads, %s, %dx%d; medians of %d rounds, in each of which "
         "everything runs once, in turn. Only ratios mean much: the machine may be shared.\n",
         scenes.front().threads, scenes.front().isa.c_str(), options.width, options.height,
-        options.samples, options.rounds);
+        options.rounds);
     out += SpeedChart(scenes) + RowTable(SummaryRows(scenes), "");
   }
   for (const std::string& line : skipped) out += "<p class=\"missed\">" + Escape(line) + "\n";

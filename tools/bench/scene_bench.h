@@ -22,7 +22,8 @@ struct SceneCase {
 };
 
 struct BenchOptions {
-  int width = 512, height = 512, samples = 4;
+  int width = 512, height = 512;
+  int samples = 0;  // a round; 0: 4 to 16, so that the wavefront takes about half a second
   int rounds = 5;   // counted, after one to warm up
   int threads = 0;  // 0: all
   std::string isa = "auto";
@@ -34,13 +35,17 @@ struct BenchOptions {
 struct SceneFigures {
   SceneCase scene;
   std::string isa;
-  int threads = 0;
+  int threads = 0, samples = 0;
   double load_seconds = 0, bvh_seconds = 0;    // load: everything before the BVH
   double wave = 0, mega = 0;                   // M rays/s
   double embree_plain = 0, embree_sorted = 0;  // M rays/s of the same rays in bare Embree ...
   double embree_packets = 0, embree_sorted_packets = 0;  // ... and in packets
-  double over_mega = 0;                                  // wavefront's speed / megakernel's
-  double least_over_mega = 0, most_over_mega = 0;        // of all rounds
+  // Speeds over one another, medians of what each round gave.
+  double over_singles = 0;  // wavefront / the faster of bare Embree's single rays, sorted or not
+  double over_embree = 0;   // ... / the fastest of its four ways
+  double mega_over_embree = 0;
+  double over_mega = 0;                            // wavefront / megakernel
+  double least_over_mega = 0, most_over_mega = 0;  // of all rounds
   double robust_price = 0;     // seconds with Embree's ROBUST flag / without, wavefront
   double film_price = 0;       // exact sums instead of floats, as a share of the wavefront's time
   double shading_gain = 0;     // time of the shading stage at one lane / at full width
@@ -51,13 +56,6 @@ struct SceneFigures {
   std::vector<std::pair<int, double>> scaling;  // threads, speed over one thread
   RunReport schedule;                           // of the wavefront's last round
   std::optional<render::LadderReport> ladder;
-
-  double EmbreeSingles() const { return std::max(embree_plain, embree_sorted); }
-  double Embree() const {
-    return std::max({EmbreeSingles(), embree_packets, embree_sorted_packets});
-  }
-  double WaveOverEmbree() const { return wave / Embree(); }
-  double MegaOverEmbree() const { return mega / Embree(); }
 };
 
 /// Throws render::Error where the scene cannot be loaded.
