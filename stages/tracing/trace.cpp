@@ -254,10 +254,12 @@ void AddShadowed(const TraceView& view, const OpacityQuery& opacity, bool occlud
                  PathState& path) {
   const Four d;
   const float through = occluded ? 0 : Transmittance(view, opacity, path);
+  // Behind the light's three floats are the bits of a normal, which are no number.
+  const FourWords light =
+      hn::IfThenElseZero(hn::FirstN(d, 3), LoadWords(path, offsetof(PathState, shadow_radiance)));
   const FourWords before = LoadWords(path, offsetof(PathState, radiance));
-  const FourWords added = LoadWords(path, offsetof(PathState, shadow_radiance));
-  const FourWords sum = hn::Add(before, hn::Mul(hn::Set(d, through), added));
-  StoreWords(hn::IfThenElse(hn::FirstN(d, 3), sum, before), path, offsetof(PathState, radiance));
+  StoreWords(hn::Add(before, hn::Mul(hn::Set(d, through), light)), path,
+             offsetof(PathState, radiance));
   path.shadow_distance = 0;
 }
 
