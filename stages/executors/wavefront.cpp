@@ -92,7 +92,8 @@ class Wavefront final : public Executor {
   void MissKernel(const Batch<Slot>& batch, Emitter& out);
   void FilmKernel(const Batch<Slot>& batch);
 
-  auto SplitByHit(std::span<const Slot> slots) const;
+  using ByHit = Partition<2, kPathsAtOnce>;
+  ByHit SplitByHit(std::span<const Slot> slots) const;
   void EmitHits(std::span<const Slot> slots, Emitter& out) const;
   void EndPaths(std::span<const Slot> slots, uint32_t worker);
   SourceStatus ClaimPackets(SourceContext& source, Emitter& out);
@@ -171,10 +172,9 @@ void Wavefront::BuildGraph() {
   }
 }
 
-/// Traced paths that hit nothing, and those that hit something.
-auto Wavefront::SplitByHit(std::span<const Slot> slots) const {
-  return Partition<2, kPathsAtOnce>(
-      slots, [&](Slot slot, size_t) { return paths_[slot].placement >= 0 ? 1 : 0; });
+/// Traced paths that hit nothing, list 0, and those that hit something, list 1.
+Wavefront::ByHit Wavefront::SplitByHit(std::span<const Slot> slots) const {
+  return {slots, [&](Slot slot, size_t) { return paths_[slot].placement >= 0 ? 1 : 0; }};
 }
 
 /// Each to the bin of what it hit.
@@ -227,7 +227,7 @@ void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worke
   }
   tally.rays.camera += count;
   // What sees the background ends at once, while its state is near: two queues less.
-  const auto by_hit = SplitByHit(slots);
+  const ByHit by_hit = SplitByHit(slots);
   if (has_environment_) kernels_.miss(c_, paths_.data(), by_hit.List(0));
   EndPaths(by_hit.List(0), worker);
   EmitHits(by_hit.List(1), out);
@@ -241,7 +241,7 @@ void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {
     } else {
       for (const Slot slot : some) IntersectPath(c_.trace, paths_[slot]);
     }
-    const auto by_hit = SplitByHit(some);
+    const ByHit by_hit = SplitByHit(some);
     out.emit(has_environment_ ? miss_ : film_, 0, by_hit.List(0));
     EmitHits(by_hit.List(1), out);
   });

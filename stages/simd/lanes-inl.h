@@ -143,8 +143,8 @@ HWY_INLINE Real<D> SafeDiv(D d, Real<D> a, Real<D> b) {
   const Mask<D> ok = hn::Gt(b, hn::Zero(d));
   return hn::IfThenElseZero(ok, a / hn::IfThenElse(ok, b, Splat(d, 1)));
 }
-/// Brings a normal x > 0, whose inverse is normal too, to 1 (double) or, a power of two, into [1,
-/// 2).
+/// A factor that brings x, which is normal and > 0 as is its inverse, into [1, 2): for floats a
+/// power of two.
 template <class D>
 HWY_INLINE Real<D> ScaleToOne(D d, Real<D> x) {
   if constexpr (sizeof(hn::TFromD<D>) != 4) {

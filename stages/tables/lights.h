@@ -72,8 +72,8 @@ struct alignas(32) LightNode {
   int16_t cos_theta_e = 0;      // bound on the emission angle about a normal, rounded down
   uint16_t radius = 0;          // ... upper half, rounded up
   int16_t axis[3] = {0, 0, 0};  // cone of emission normals (Conty Estevez & Kulla 2018)
-  int16_t cos_theta_o = 0;  // bound on the angle between an emitter's normal and the axis: rounded
-  int16_t sin_theta_o = 0;  // down, and up
+  int16_t cos_theta_o = 0;      // bound on the angle between an emitter's normal and the axis,
+  int16_t sin_theta_o = 0;      // rounded down and up
   uint16_t signed_power = 0;  // upper half of candela of luminance, summed, as a share of the whole
                               // tree's; negative: the cone's opposite counts as well (two-sided
                               // emitters)
@@ -118,8 +118,7 @@ struct Environment {
 struct LightTables {
   HugeVector<Light> lights;     // triangle lights first, in placement order; then punctual ones
   HugeVector<LightNode> nodes;  // depth-first; empty: no light in the tree
-  HugeVector<int32_t>
-      parents;  // of each pair of nodes: the parent of 2k and 2k + 1; -1 at the root
+  HugeVector<int32_t> parents;  // k: the parent of nodes 2k and 2k + 1; -1 at the root
   std::vector<int32_t> infinite_lights;  // indices of directional lights
   Environment environment;
   float tree_probability = 0;         // of choosing the tree, each infinite light, the environment:

@@ -72,6 +72,10 @@ float Power(const LightNode& n) {
 double ConeAngle(const LightNode& n) {
   return std::acos(double{stages::FromFixed(n.cos_theta_o)});
 }
+/// What the cone's angle was at least, before its cosine was rounded down.
+double LeastConeAngle(const LightNode& n) {
+  return std::acos(std::min((n.cos_theta_o + 1.0) / stages::kFixedOne, 1.0));
+}
 double AngleBetween(const LightNode& a, const LightNode& b) {
   double sine = 0, cosine = 0;
   for (int i = 0; i < 3; ++i) {
@@ -82,9 +86,6 @@ double AngleBetween(const LightNode& a, const LightNode& b) {
   }
   return std::atan2(std::sqrt(sine), cosine);
 }
-// Of the angle between axes in 16 bits, and of a cone about one that is all but a line: rounding
-// its cosine by 2^-15 opens it by this.
-const double kRounding = std::acos(1 - 0x1p-15) + 1e-3;
 
 /// Checks the subtree at `node`; returns its number of leaves and deepens `depth` to the deepest.
 int CheckSubtree(const stages::LightTables& tables, int32_t node, int level, int& depth) {
@@ -105,12 +106,12 @@ int CheckSubtree(const stages::LightTables& tables, int32_t node, int level, int
     // The child's cone is within the parent's, or its opposite if that counts.
     double between = AngleBetween(c, n);
     if (Power(n) < 0) between = std::min(between, std::acos(-1.0) - between);
-    const double outermost = between + ConeAngle(c);
-    EXPECT_LE(std::min(outermost, std::acos(-1.0)), ConeAngle(n) + kRounding);
+    const double outermost = between + LeastConeAngle(c);
+    EXPECT_LE(std::min(outermost, std::acos(-1.0)), ConeAngle(n) + 1e-3);
     power += std::abs(Power(c));
     leaves += CheckSubtree(tables, child, level + 1, depth);
   }
-  EXPECT_NEAR(power / std::abs(Power(n)), 1, 0x1p-7);  // each has 8 bits
+  EXPECT_NEAR(power / std::abs(Power(n)), 1, 0x1.02p-7);  // each rounded to 8 bits
   return leaves;
 }
 
