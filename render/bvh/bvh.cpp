@@ -49,8 +49,10 @@ GeometryPtr NewTriangles(RTCDevice device, const SceneTables& scene, const Place
   if (!geometry) ThrowEmbree(device, "making a geometry");
   const stages::GeometryTables& g = scene.geometry;
   rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                             g.floats.data(), sizeof(float) * static_cast<size_t>(p.positions),
-                             3 * sizeof(float), static_cast<size_t>(shape.vertex_count));
+                             g.vertices.data(),
+                             sizeof(stages::MeshVertex) * static_cast<size_t>(p.first_vertex) +
+                                 offsetof(stages::MeshVertex, position),
+                             sizeof(stages::MeshVertex), static_cast<size_t>(shape.vertex_count));
   rtcSetSharedGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                              g.indices.data(),
                              sizeof(uint32_t) * static_cast<size_t>(p.first_index),

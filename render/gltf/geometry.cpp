@@ -3,6 +3,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "render/gltf/normals.h"
@@ -20,6 +21,25 @@ constexpr uint64_t kNumbersAtOnce = 8 << 20;
 /// In all streams of a primitive.
 uint64_t FloatsOf(const Primitive& p) {
   return p.positions.size() + p.normals.size() + p.tangents.size() + p.uvs.size() + p.colors.size();
+}
+
+stages::MeshVertex VertexOf(const Primitive& p, size_t i) {
+  stages::MeshVertex v = {};
+  std::copy_n(&p.positions[3 * i], 3, v.position);
+  if (!p.normals.empty()) std::copy_n(&p.normals[3 * i], 3, v.normal);
+  if (!p.uvs.empty()) std::copy_n(&p.uvs[i * p.uv_sets * 2], 2, v.uv);
+  return v;
+}
+
+/// All sets but the first.
+std::vector<float> FurtherUvs(const Primitive& p) {
+  std::vector<float> uvs;
+  if (p.uvs.empty() || p.uv_sets < 2) return uvs;
+  const size_t width = size_t{2} * p.uv_sets;
+  uvs.reserve(p.vertex_count() * (width - 2));
+  for (size_t at = 0; at < p.uvs.size(); at += width)
+    uvs.insert(uvs.end(), &p.uvs[at + 2], &p.uvs[at] + width);
+  return uvs;
 }
 }  // namespace
 
@@ -99,22 +119,28 @@ void GeometryBuilder::AddTangents(Primitive& primitive, int material) const {
 
 void GeometryBuilder::StoreStreams(const Primitive& primitive, stages::Shape& shape) {
   constexpr size_t kMost = std::numeric_limits<int32_t>::max();
-  const uint64_t floats = FloatsOf(primitive);
-  if (tables_.floats.size() + floats > kMost ||
+  const size_t vertices = primitive.vertex_count();
+  const std::vector<float> uvs = FurtherUvs(primitive);
+  const uint64_t floats = primitive.tangents.size() + uvs.size() + primitive.colors.size();
+  if (tables_.vertices.size() + vertices > stages::kMostVertices ||
+      tables_.floats.size() + floats > kMost ||
       tables_.indices.size() + primitive.indices.size() > kMost) {
     document_.Fail(primitive.pointer,
                    "the scene has more vertices than 32-bit offsets can number; "
                    "instance its meshes or split it");
   }
-  Charge((floats + primitive.indices.size()) * 4);
+  Charge(vertices * sizeof(stages::MeshVertex) + (floats + primitive.indices.size()) * 4);
   shape.first_index = static_cast<int32_t>(tables_.indices.size());
   shape.triangle_count = static_cast<int32_t>(primitive.indices.size() / 3);
-  shape.vertex_count = static_cast<int32_t>(primitive.vertex_count());
-  shape.positions = StoreFloats(primitive.positions);
-  shape.normals = StoreFloats(primitive.normals);
+  shape.first_vertex = static_cast<int32_t>(tables_.vertices.size());
+  shape.vertex_count = static_cast<int32_t>(vertices);
+  shape.smooth = !primitive.normals.empty();
+  tables_.vertices.resize(tables_.vertices.size() + vertices);
+  for (size_t i = 0; i < vertices; ++i)
+    tables_.vertices[shape.first_vertex + i] = VertexOf(primitive, i);
+  shape.uv_sets = primitive.uvs.empty() ? 0 : primitive.uv_sets;
+  shape.more_uvs = StoreFloats(uvs);
   shape.tangents = StoreFloats(primitive.tangents);
-  shape.uvs = StoreFloats(primitive.uvs);
-  shape.uv_sets = shape.uvs == kNone ? 0 : primitive.uv_sets;
   shape.colors = StoreFloats(primitive.colors);
   tables_.indices.insert(tables_.indices.end(), primitive.indices.begin(), primitive.indices.end());
 }

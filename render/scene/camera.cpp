@@ -39,7 +39,7 @@ struct Bounds {
 Bounds ShapeBounds(const stages::GeometryTables& g, const stages::Shape& shape) {
   Bounds bounds;
   for (int32_t v = 0; v < shape.vertex_count; ++v) {
-    const float* p = &g.floats[shape.positions + size_t{3} * v];
+    const float* const p = g.vertices[static_cast<size_t>(shape.first_vertex) + v].position;
     bounds.Add({p[0], p[1], p[2]});
   }
   return bounds;

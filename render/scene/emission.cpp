@@ -29,8 +29,10 @@ struct Uv {
 };
 
 Uv VertexUv(const GeometryTables& g, const Placement& p, uint32_t vertex, int32_t set) {
-  if (p.uvs == kNone || set >= p.uv_sets) return {};
-  const float* const uv = &g.floats[p.uvs + (size_t{vertex} * p.uv_sets + set) * 2];
+  if (set >= p.uv_sets) return {};
+  const float* const uv =
+      set == 0 ? g.vertices[static_cast<size_t>(p.first_vertex) + vertex].uv
+               : &g.floats[p.more_uvs + (size_t{vertex} * (p.uv_sets - 1) + (set - 1)) * 2];
   return {uv[0], uv[1]};
 }
 
@@ -91,7 +93,7 @@ double MeanTexture(const SceneTables& scene, const TextureSlot& slot,
 }
 
 void WorldVertex(const GeometryTables& g, const Placement& p, uint32_t vertex, float out[3]) {
-  const float* const v = &g.floats[p.positions + size_t{3} * vertex];
+  const float* const v = g.vertices[static_cast<size_t>(p.first_vertex) + vertex].position;
   if ((p.flags & stages::kPlacementInstanced) == 0) {
     std::copy_n(v, 3, out);
     return;

@@ -51,31 +51,23 @@ bool Vanishes(const Matrix& m) {
   return true;
 }
 
-void TransformPoints(const float* in, float* out, int32_t count, const Matrix& m) {
-  for (int32_t v = 0; v < count; ++v, in += 3, out += 3) {
-    const double x = in[0], y = in[1], z = in[2];
-    for (int r = 0; r < 3; ++r) {
-      out[r] =
-          static_cast<float>(m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3]);
-    }
+void TransformPoint(const Matrix& m, const float in[3], float out[3]) {
+  const double x = in[0], y = in[1], z = in[2];
+  for (int r = 0; r < 3; ++r) {
+    out[r] = static_cast<float>(m[4 * r] * x + m[4 * r + 1] * y + m[4 * r + 2] * z + m[4 * r + 3]);
   }
 }
 
-// Directions through a 3x3 matrix, normalised; a vanishing one becomes zero, which readers replace
-// by the triangle's.
-template <int kStride>
-void TransformDirections(const float* in, float* out, int32_t count, const std::array<double, 9>& m,
-                         double w_sign) {
-  for (int32_t v = 0; v < count; ++v, in += kStride, out += kStride) {
-    double d[3], length = 0;
-    for (int r = 0; r < 3; ++r) {
-      d[r] = m[3 * r] * in[0] + m[3 * r + 1] * in[1] + m[3 * r + 2] * in[2];
-      length += d[r] * d[r];
-    }
-    length = std::sqrt(length);
-    if constexpr (kStride == 4) out[3] = static_cast<float>(in[3] * w_sign);
-    for (int r = 0; r < 3; ++r) out[r] = length > 0 ? static_cast<float>(d[r] / length) : 0.0f;
+// Through a 3x3 matrix, normalised; a vanishing direction becomes zero, which readers replace by
+// the triangle's.
+void TransformDirection(const std::array<double, 9>& m, const float in[3], float out[3]) {
+  double d[3], length = 0;
+  for (int r = 0; r < 3; ++r) {
+    d[r] = m[3 * r] * in[0] + m[3 * r + 1] * in[1] + m[3 * r + 2] * in[2];
+    length += d[r] * d[r];
   }
+  length = std::sqrt(length);
+  for (int r = 0; r < 3; ++r) out[r] = length > 0 ? static_cast<float>(d[r] / length) : 0.0f;
 }
 
 class Placer {
@@ -84,9 +76,8 @@ class Placer {
     uses_.resize(g_.meshes.size());
     for (const MeshInstance& instance : g_.instances) ++uses_[instance.mesh];
     for (const Shape& shape : g_.shapes) {
-      ++float_users_[shape.positions];
-      if (shape.normals != kNone) ++float_users_[shape.normals];
-      if (shape.tangents != kNone) ++float_users_[shape.tangents];
+      ++vertex_users_[shape.first_vertex];
+      if (shape.tangents != kNone) ++tangent_users_[shape.tangents];
       ++index_users_[shape.first_index];
     }
   }
@@ -114,6 +105,7 @@ class Placer {
   // Room for all copies of streams at once: these tables are large, and each move touches new
   // pages.
   void Reserve() {
+    size_t vertices = g_.vertices.size();
     size_t floats = g_.floats.size() + kFloatsBehind;
     size_t indices = g_.indices.size() + kIndicesBehind;
     for (const MeshInstance& instance : g_.instances) {
@@ -122,15 +114,17 @@ class Placer {
       for (int32_t s = 0; s < mesh.shape_count; ++s) {
         const Shape& shape = g_.shapes[mesh.first_shape + s];
         if (BakesInPlace(instance, shape)) continue;
-        const int width = 3 + (shape.normals != kNone ? 3 : 0) + (shape.tangents != kNone ? 4 : 0);
-        floats += static_cast<size_t>(width) * shape.vertex_count;
+        vertices += static_cast<size_t>(shape.vertex_count);
+        if (shape.tangents != kNone) floats += size_t{4} * shape.vertex_count;
         if (Determinant(instance.object_to_world) < 0) indices += size_t{3} * shape.triangle_count;
       }
     }
-    if (floats > kMostElements || indices > kMostElements) {
+    if (vertices > stages::kMostVertices || floats > kMostElements || indices > kMostElements) {
       throw InputError(where_,
-                       "the scene has more than 2^31 vertex values; split it or use fewer copies");
+                       "the scene has more than 2^28 vertices or 2^31 other values of them; split "
+                       "it or use fewer copies");
     }
+    g_.vertices.reserve(vertices);
     g_.floats.reserve(floats);
     g_.indices.reserve(indices);
   }
@@ -150,11 +144,8 @@ class Placer {
   }
   // Streams may be overwritten with world-space values when nobody else reads them.
   bool OwnsStreams(const Shape& shape) const {
-    const auto sole = [&](int32_t offset) {
-      return offset == kNone || float_users_.at(offset) == 1;
-    };
-    return sole(shape.positions) && sole(shape.normals) && sole(shape.tangents) &&
-           index_users_.at(shape.first_index) == 1;
+    return vertex_users_.at(shape.first_vertex) == 1 && index_users_.at(shape.first_index) == 1 &&
+           (shape.tangents == kNone || tangent_users_.at(shape.tangents) == 1);
   }
   bool Copied(int32_t mesh) const {
     return Triangles(g_.meshes[mesh]) * uses_[mesh] <= kCopyTriangles;
@@ -163,11 +154,11 @@ class Placer {
   Placement MakePlacement(const Shape& shape, int32_t object) const {
     Placement p;
     p.first_index = shape.first_index;
-    p.positions = shape.positions;
-    p.normals = shape.normals;
+    p.first_vertex = shape.first_vertex;
+    p.flags = shape.smooth ? stages::kPlacementSmooth : 0;
     p.tangents = shape.tangents;
-    p.uvs = shape.uvs;
     p.uv_sets = shape.uv_sets;
+    p.more_uvs = shape.more_uvs;
     p.colors = shape.colors;
     p.material = shape.material;
     p.object = object;
@@ -199,20 +190,31 @@ class Placer {
     const int32_t n = shape.vertex_count;
     const bool mirrored = Determinant(m) < 0;
     if (!in_place) {
-      p.positions = Extend(g_.floats, size_t{3} * n);
-      if (shape.normals != kNone) p.normals = Extend(g_.floats, size_t{3} * n);
+      p.first_vertex = Extend(g_.vertices, static_cast<size_t>(n));
       if (shape.tangents != kNone) p.tangents = Extend(g_.floats, size_t{4} * n);
     }
-    float* const f = g_.floats.data();
-    const std::array<double, 9> linear = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]};
-    TransformPoints(f + shape.positions, f + p.positions, n, m);
-    if (shape.normals != kNone) {
-      TransformDirections<3>(f + shape.normals, f + p.normals, n, NormalMatrix(m), 1);
-    }
-    if (shape.tangents != kNone) {
-      TransformDirections<4>(f + shape.tangents, f + p.tangents, n, linear, mirrored ? -1 : 1);
-    }
+    BakeVertices(shape, m, &g_.vertices[p.first_vertex]);
+    if (shape.tangents != kNone) BakeTangents(shape, m, mirrored, &g_.floats[p.tangents]);
     if (mirrored) FlipWinding(shape, in_place, p);
+  }
+
+  void BakeVertices(const Shape& shape, const Matrix& m, stages::MeshVertex* out) const {
+    const stages::MeshVertex* const in = &g_.vertices[shape.first_vertex];
+    const std::array<double, 9> normal_matrix = NormalMatrix(m);
+    for (int32_t v = 0; v < shape.vertex_count; ++v) {
+      out[v] = in[v];
+      TransformPoint(m, in[v].position, out[v].position);
+      if (shape.smooth) TransformDirection(normal_matrix, in[v].normal, out[v].normal);
+    }
+  }
+
+  void BakeTangents(const Shape& shape, const Matrix& m, bool mirrored, float* out) const {
+    const float* in = &g_.floats[shape.tangents];
+    const std::array<double, 9> linear = {m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]};
+    for (int32_t v = 0; v < shape.vertex_count; ++v, in += 4, out += 4) {
+      TransformDirection(linear, in, out);
+      out[3] = mirrored ? -in[3] : in[3];
+    }
   }
 
   void FlipWinding(const Shape& shape, bool in_place, Placement& p) {
@@ -238,7 +240,8 @@ class Placer {
     for (int32_t s = 0; s < mesh.shape_count; ++s) {
       const Shape& shape = g_.shapes[mesh.first_shape + s];
       Placement p = MakePlacement(shape, instance.object);
-      p.flags = stages::kPlacementInstanced | (Determinant(m) < 0 ? stages::kPlacementMirrored : 0);
+      p.flags |=
+          stages::kPlacementInstanced | (Determinant(m) < 0 ? stages::kPlacementMirrored : 0);
       for (int i = 0; i < 12; ++i) p.object_to_world[i] = static_cast<float>(m[i]);
       for (int i = 0; i < 9; ++i) p.normal_to_world[i] = static_cast<float>(normal[i] / largest);
       plan_.instanced_triangles += shape.triangle_count;
@@ -248,8 +251,9 @@ class Placer {
 
   stages::GeometryTables& g_;
   const std::string& where_;
-  std::vector<uint32_t> uses_;                                  // instances per mesh
-  std::unordered_map<int32_t, int> float_users_, index_users_;  // shapes per stream offset
+  std::vector<uint32_t> uses_;  // instances per mesh
+  std::unordered_map<int32_t, int> vertex_users_, tangent_users_,
+      index_users_;  // shapes per offset
   PlacementPlan plan_;
 };
 

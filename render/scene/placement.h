@@ -30,7 +30,8 @@ struct PlacementPlan {
 /// matrices are already relative to `scene.origin`. Meshes used once are baked in place (one BVH
 /// level is faster than two), small ones used often are copied, the rest is instanced and never
 /// copied. Instances with a zero scale that leaves less than a plane vanish. Throws
-/// InputError(`where`, ...) if vertex streams outgrow 2^31 - 1 elements.
+/// InputError(`where`, ...) if there are more than stages::kMostVertices vertices, or 2^31 - 1
+/// elements of another stream.
 PlacementPlan PlaceInstances(stages::SceneTables& scene, const std::string& where);
 
 }  // namespace carpool::render

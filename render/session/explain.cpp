@@ -37,7 +37,7 @@ std::array<double, 3> HitPlace(const stages::GeometryView& g, const PathState& p
     const uint32_t vertex =
         g.indices[static_cast<uint32_t>(p.first_index) + 3 * path.primitive + k];
     for (size_t i = 0; i < 3; ++i)
-      local[i] += weights[k] * g.floats[static_cast<size_t>(p.positions) + 3 * size_t{vertex} + i];
+      local[i] += weights[k] * g.vertices[static_cast<size_t>(p.first_vertex) + vertex].position[i];
   }
   std::array<double, 3> world = {0, 0, 0};
   for (size_t r = 0; r < 3; ++r) {

@@ -83,15 +83,14 @@ struct Arrival {
 };
 
 template <class D>
-HWY_INLINE TextureFootprint<D> MakeFootprint(D d, const KernelContext& c, const Vertex<D>& v,
+HWY_INLINE TextureFootprint<D> MakeFootprint(D d, const Vertex<D>& v, const Corners<D>& corners,
                                              Real<D> twice_area) {
-  const TextureTriangle<D> uvs = GatherTextureTriangle(d, c, v.at, hn::Zero(IntTag<D>()));
   // Width of the cone across the ray, in texture coordinates: the supersampling of the pixel filter
   // takes care of what slant adds (Akenine-Moller et al. 2021 would divide by the cosine, and
   // blur).
-  const Real<D> density = SafeDiv(d, TwiceTextureArea<D>(uvs), twice_area);
+  const Real<D> density = SafeDiv(d, TwiceTextureArea<D>(corners), twice_area);
   const Real<D> least = Splat(d, 1e-30);  // a camera inside a surface, a shape without coordinates
-  return {TextureCoordinates<D>(v.at, uvs),
+  return {InterpolateUv<D>(v.at, corners.v0.uv, corners.v1.uv, corners.v2.uv),
           hn::MulAdd(FastLog2(d, hn::Max(density, least)), Splat(d, 0.5),
                      FastLog2(d, hn::Max(v.cone_width, least))),
           HashUniform(d, v.key, v.number, Purpose::texture_level, hn::Zero(UintTag<D>()))};
@@ -126,13 +125,15 @@ HWY_INLINE void LoadVertex(D d, const KernelContext& c, const PathLanes<D>& p, V
   a.primitive = hn::BitCast(di, hit.x);
   a.at = MakeSurfacePoint(d, c, hn::BitCast(di, names.w), a.primitive, hit.y, hit.z);
   v.at = a.at;
-  a.triangle = TriangleVertices(d, c.geometry, a.at.placement, a.at.index);
-  a.surface = MakeSurface(d, c, a.at, a.triangle, direction);
+  const Corners<D> corners = GatherCorners(d, c, a.at);
+  a.triangle = TriangleToWorld(d, c.geometry, a.at.placement, corners.v0.position,
+                               corners.v1.position, corners.v2.position);
+  a.surface = MakeSurface(d, a.at, corners, a.triangle, direction);
   v.geometric = a.surface.geometric;
 
   v.cone_width = hn::MulAdd(v.cone_spread, a.distance, through.w);
   if (MayHaveTextures(v.at.material)) {
-    v.footprint = MakeFootprint(d, c, v, a.surface.twice_area);
+    v.footprint = MakeFootprint(d, v, corners, a.surface.twice_area);
   } else {  // nothing will be read
     v.footprint = {{hn::Zero(d), hn::Zero(d)}, hn::Zero(d), hn::Zero(d)};
   }
@@ -226,7 +227,7 @@ HWY_INLINE void AddEmission(D d, const KernelContext& c, const Arrival<D>& a, Ve
   const Vec3<D> emitted = EmittedRadiance(d, c, v.at, v.footprint.uv, active);
   Real<D> weight = Splat(d, 1);
   const IntTag<D> di;
-  const Int<D> first_light = a.at.placement.first_light;
+  const Int<D> first_light = FieldInt(d, a.at.placement.record, offsetof(Placement, first_light));
   const Mask<D> sampled =
       hn::And(hn::And(active, IsPresent(d, first_light)), hn::Gt(a.ray_pdf, hn::Zero(d)));
   if (!hn::AllFalse(d, sampled)) {
@@ -282,7 +283,7 @@ HWY_INLINE Vec3<D> SampledRadiance(D d, const KernelContext& c, const lights::Li
   const SurfacePoint<D> at =
       MakeSurfacePoint(d, c, hn::IfThenElseZero(where, name.placement),
                        hn::IfThenElseZero(where, name.primitive), light.b1, light.b2);
-  const Vec2<D> uv = TextureCoordinates(d, c, at, hn::Zero(di));
+  const Vec2<D> uv = FirstCoordinates(d, c, at);
   const Vec3<D> emitted = EmittedRadiance(d, c, at, uv, varies);
   return Select<D>(varies, Mul<D>(light.radiance_or_irradiance, emitted),
                    light.radiance_or_irradiance);
@@ -623,8 +624,7 @@ HWY_INLINE Real<D> PointOpacity(D d, const KernelContext& c, int32_t placement, 
   const SurfacePoint<D> at =
       MakeSurfacePoint(d, c, hn::Set(di, placement), hn::Set(di, static_cast<int32_t>(primitive)),
                        Splat(d, u), Splat(d, v));
-  const TextureFootprint<D> finest = {TextureCoordinates(d, c, at, hn::Zero(di)), Splat(d, -100),
-                                      hn::Zero(d)};
+  const TextureFootprint<D> finest = {FirstCoordinates(d, c, at), Splat(d, -100), hn::Zero(d)};
   const Mask<D> all = hn::FirstN(d, hn::Lanes(d));
   return Opacity(d, at, BaseColor(d, c, at, finest, all).a);
 }

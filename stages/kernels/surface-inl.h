@@ -25,7 +25,7 @@ namespace carpool::stages::HWY_NAMESPACE {
 template <class D>
 struct TexturePoint {
   Records<Material, D> material;
-  Int<D> uvs, uv_sets;  // of the placement
+  Int<D> uv_sets, more_uvs;  // of the placement
   TriangleIndices<D> index;
   Real<D> b0, b1, b2;
 };
@@ -40,7 +40,7 @@ HWY_INLINE SurfacePoint<D> MakeSurfacePoint(D d, const KernelContext& c, Int<D> 
                                             Int<D> primitive, Real<D> b1, Real<D> b2) {
   const Real<D> b0 = hn::Max(Splat(d, 1) - b1 - b2, hn::Zero(d));
   const PlacementLanes<D> lanes = LoadPlacements(d, c.geometry.placements, placement);
-  return {{MakeRecords(d, c.materials, lanes.material), lanes.uvs, lanes.uv_sets,
+  return {{MakeRecords(d, c.materials, lanes.material), lanes.uv_sets, lanes.more_uvs,
            GatherTriangleIndices(d, c.geometry, lanes, primitive), b0, b1, b2},
           lanes};
 }
@@ -121,8 +121,38 @@ HWY_INLINE Vec3<D> PositionError(D d, const Records<Placement, D>& placement, Ma
   return error;
 }
 
+/// False only if no lane's material has a texture, or if all are opaque: of a batch of one material
+/// that is known from its record.
 template <class D>
-HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoint<D>& at,
+HWY_INLINE bool MayHaveTextures(const Records<Material, D>& material) {
+  if (material.same == nullptr) return true;
+  return std::any_of(std::begin(material.same->slots), std::end(material.same->slots),
+                     [](int32_t slot) { return slot != kNone; });
+}
+template <class D>
+HWY_INLINE bool MayBeTransparent(const Records<Material, D>& material) {
+  return material.same == nullptr || material.same->alpha_mode != AlphaMode::opaque;
+}
+
+/// The vertices of the triangle at the point, in the space of its shape.
+template <class D>
+struct Corners {
+  VertexLanes<D> v0, v1, v2;
+};
+template <class D>
+HWY_INLINE Corners<D> GatherCorners(D d, const KernelContext& c, const SurfacePoint<D>& at) {
+  const Mask<D> smooth = PlacementHas(d, at.placement, kPlacementSmooth);
+  const bool bare = hn::AllFalse(d, smooth) && !MayHaveTextures(at.material);
+  const auto vertex = [&](Int<D> i) HWY_ATTR {
+    return bare ? GatherBareVertex(d, c.geometry, at.placement, i)
+                : GatherVertex(d, c.geometry, at.placement, i);
+  };
+  return {vertex(at.index.i0), vertex(at.index.i1), vertex(at.index.i2)};
+}
+
+/// `t` is the triangle of the corners, in world space.
+template <class D>
+HWY_INLINE Surface<D> MakeSurface(D d, const SurfacePoint<D>& at, const Corners<D>& corners,
                                   const Triangle<D>& t, const Vec3<D>& ray_direction) {
   const Mask<D> instanced = PlacementHas(d, at.placement, kPlacementInstanced);
   Surface<D> s;
@@ -136,15 +166,10 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
   s.back = hn::Lt(Dot(front, toward), hn::Zero(d));
   s.geometric = Select<D>(s.back, Neg<D>(front), front);
 
-  const Int<D> normals = at.placement.normals;
-  const Mask<D> smooth = IsPresent(d, normals);
+  const Mask<D> smooth = PlacementHas(d, at.placement, kPlacementSmooth);
   s.shading = s.geometric;
   if (!hn::AllFalse(d, smooth)) {
-    const Int<D> base = hn::Max(normals, hn::Zero(IntTag<D>()));
-    const auto vertex = [&](Int<D> i) HWY_ATTR {
-      return GatherTriple(d, c.geometry.floats, base + i * hn::Set(IntTag<D>(), 3));
-    };
-    Vec3<D> n = Interpolate<D>(at, vertex(at.index.i0), vertex(at.index.i1), vertex(at.index.i2));
+    Vec3<D> n = Interpolate<D>(at, corners.v0.normal, corners.v1.normal, corners.v2.normal);
     if (!hn::AllFalse(d, instanced)) {
       n = Select<D>(instanced, NormalToWorld(d, at.placement.record, n), n);
     }
@@ -155,53 +180,45 @@ HWY_INLINE Surface<D> MakeSurface(D d, const KernelContext& c, const SurfacePoin
   return s;
 }
 
-/// A triangle's vertices in one set of texture coordinates; idle where the shape has no such set.
+/// Coordinates of the first set; (0, 0) where the shape has none.
 template <class D>
-struct TextureTriangle {
-  Mask<D> present;
-  Vec2<D> v0, v1, v2;
-};
+HWY_INLINE Vec2<D> InterpolateUv(const TexturePoint<D>& at, const Vec2<D>& v0, const Vec2<D>& v1,
+                                 const Vec2<D>& v2) {
+  return {Interpolate<D>(at, v0.x, v1.x, v2.x), Interpolate<D>(at, v0.y, v1.y, v2.y)};
+}
 template <class D>
-HWY_INLINE TextureTriangle<D> GatherTextureTriangle(D d, const KernelContext& c,
-                                                    const TexturePoint<D>& at, Int<D> set) {
-  const IntTag<D> di;
-  const Int<D> uvs = at.uvs, sets = at.uv_sets;
-  TextureTriangle<D> t;
-  t.present = hn::And(IsPresent(d, uvs), hn::RebindMask(d, hn::Lt(set, sets)));
-  if (hn::AllFalse(d, t.present)) {
-    const Vec2<D> zero = {hn::Zero(d), hn::Zero(d)};
-    t.v0 = t.v1 = t.v2 = zero;
-    return t;
-  }
-  const auto vertex = [&](Int<D> i) HWY_ATTR {
-    const Int<D> word = uvs + hn::ShiftLeft<1>(i * sets + set);
-    return GatherPair(d, c.geometry.floats,
-                      hn::IfThenElseZero(hn::RebindMask(di, t.present), word));
-  };
-  t.v0 = vertex(at.index.i0);
-  t.v1 = vertex(at.index.i1);
-  t.v2 = vertex(at.index.i2);
-  return t;
+HWY_INLINE Vec2<D> FirstCoordinates(D d, const KernelContext& c, const SurfacePoint<D>& at) {
+  const auto vertex = [&](Int<D> i)
+                          HWY_ATTR { return GatherFirstUv(d, c.geometry, at.placement, i); };
+  return InterpolateUv<D>(at, vertex(at.index.i0), vertex(at.index.i1), vertex(at.index.i2));
 }
 
-/// Texture coordinates of the point; (0, 0) where the shape has none.
+/// Coordinates of the lanes' sets where those are not the first; (0, 0) where the shape has no such
+/// set.
 template <class D>
-HWY_INLINE Vec2<D> TextureCoordinates(const TexturePoint<D>& at, const TextureTriangle<D>& t) {
-  return {hn::IfThenElseZero(t.present, Interpolate<D>(at, t.v0.x, t.v1.x, t.v2.x)),
-          hn::IfThenElseZero(t.present, Interpolate<D>(at, t.v0.y, t.v1.y, t.v2.y))};
-}
-template <class D>
-HWY_INLINE Vec2<D> TextureCoordinates(D d, const KernelContext& c, const TexturePoint<D>& at,
+HWY_INLINE Vec2<D> FurtherCoordinates(D d, const KernelContext& c, const TexturePoint<D>& at,
                                       Int<D> set) {
-  return TextureCoordinates<D>(at, GatherTextureTriangle(d, c, at, set));
+  const IntTag<D> di;
+  const Int<D> one = hn::Set(di, 1);
+  const auto present = hn::And(hn::Gt(set, hn::Zero(di)), hn::Lt(set, at.uv_sets));
+  if (hn::AllFalse(di, present)) return {hn::Zero(d), hn::Zero(d)};
+  const auto vertex = [&](Int<D> i) HWY_ATTR {
+    const Int<D> pair = i * (at.uv_sets - one) + (set - one);
+    return GatherPair(d, c.geometry.floats,
+                      hn::IfThenElseZero(present, at.more_uvs + hn::ShiftLeft<1>(pair)));
+  };
+  const Vec2<D> uv =
+      InterpolateUv<D>(at, vertex(at.index.i0), vertex(at.index.i1), vertex(at.index.i2));
+  const Mask<D> where = hn::RebindMask(d, present);
+  return {hn::IfThenElseZero(where, uv.x), hn::IfThenElseZero(where, uv.y)};
 }
 
-/// Twice the triangle's area in texture coordinates.
+/// Twice the triangle's area in texture coordinates of the first set.
 template <class D>
-HWY_INLINE Real<D> TwiceTextureArea(const TextureTriangle<D>& t) {
-  const Vec2<D> a = {t.v1.x - t.v0.x, t.v1.y - t.v0.y};
-  const Vec2<D> b = {t.v2.x - t.v0.x, t.v2.y - t.v0.y};
-  return hn::IfThenElseZero(t.present, hn::Abs(DifferenceOfProducts(a.x, b.y, b.x, a.y)));
+HWY_INLINE Real<D> TwiceTextureArea(const Corners<D>& t) {
+  const Vec2<D> a = {t.v1.uv.x - t.v0.uv.x, t.v1.uv.y - t.v0.uv.y};
+  const Vec2<D> b = {t.v2.uv.x - t.v0.uv.x, t.v2.uv.y - t.v0.uv.y};
+  return hn::Abs(DifferenceOfProducts(a.x, b.y, b.x, a.y));
 }
 
 /// Where textures are read: coordinates of the first set and what the ray cone covers there.
@@ -211,19 +228,6 @@ struct TextureFootprint {
   Real<D> log2_width;  // of the cone, in texture coordinates; very negative: finest level
   Real<D> u_level;     // chooses between neighbouring mip levels
 };
-
-/// False only if no lane's material has a texture, or if all are opaque: of a batch of one material
-/// that is known from its record.
-template <class D>
-HWY_INLINE bool MayHaveTextures(const Records<Material, D>& material) {
-  if (material.same == nullptr) return true;
-  return std::any_of(std::begin(material.same->slots), std::end(material.same->slots),
-                     [](int32_t slot) { return slot != kNone; });
-}
-template <class D>
-HWY_INLINE bool MayBeTransparent(const Records<Material, D>& material) {
-  return material.same == nullptr || material.same->alpha_mode != AlphaMode::opaque;
-}
 
 /// Reads one texture slot of each lane's material; `absent` where the material has none.
 template <class D>
@@ -245,7 +249,7 @@ HWY_INLINE Rgba<D> MaterialTexture(D d, const KernelContext& c, const TexturePoi
   Vec2<D> uv = footprint.uv;
   const Mask<D> other_set = hn::RebindMask(d, hn::Gt(set, hn::Zero(di)));
   if (!hn::AllFalse(d, other_set)) {
-    const Vec2<D> other = TextureCoordinates(d, c, at, set);
+    const Vec2<D> other = FurtherCoordinates(d, c, at, set);
     uv = {hn::IfThenElse(other_set, other.x, uv.x), hn::IfThenElse(other_set, other.y, uv.y)};
   }
   const Rgba<D> texel =

@@ -29,9 +29,8 @@ struct Triangle {
 template <class D>
 struct PlacementLanes {
   Records<Placement, D> record;
-  Int<D> first_index, positions, normals, tangents;
-  Int<D> uvs, uv_sets, colors, material;
-  Int<D> flags, first_light;
+  Int<D> first_index, first_vertex, flags, material;
+  Int<D> tangents, colors, uv_sets, more_uvs;
 };
 
 /// `index` must be valid in every lane.
@@ -42,24 +41,21 @@ HWY_INLINE PlacementLanes<D> LoadPlacements(D d, const Placement* base, Int<D> i
     const auto field = [&](size_t offset) HWY_ATTR { return FieldInt(d, record, offset); };
     return {record,
             field(offsetof(Placement, first_index)),
-            field(offsetof(Placement, positions)),
-            field(offsetof(Placement, normals)),
-            field(offsetof(Placement, tangents)),
-            field(offsetof(Placement, uvs)),
-            field(offsetof(Placement, uv_sets)),
-            field(offsetof(Placement, colors)),
-            field(offsetof(Placement, material)),
+            field(offsetof(Placement, first_vertex)),
             field(offsetof(Placement, flags)),
-            field(offsetof(Placement, first_light))};
+            field(offsetof(Placement, material)),
+            field(offsetof(Placement, tangents)),
+            field(offsetof(Placement, colors)),
+            field(offsetof(Placement, uv_sets)),
+            field(offsetof(Placement, more_uvs))};
   }
   const IntQuad<D> a = FieldIntQuad(d, base, index, offsetof(Placement, first_index));
-  const IntQuad<D> b = FieldIntQuad(d, base, index, offsetof(Placement, uvs));
-  const IntQuad<D> c = FieldIntQuad(d, base, index, offsetof(Placement, flags));
-  return {record, a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.z};
+  const IntQuad<D> b = FieldIntQuad(d, base, index, offsetof(Placement, tangents));
+  return {record, a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w};
 }
-static_assert(offsetof(Placement, tangents) == offsetof(Placement, first_index) + 12 &&
-              offsetof(Placement, material) == offsetof(Placement, uvs) + 12 &&
-              offsetof(Placement, first_light) == offsetof(Placement, flags) + 8);
+static_assert(offsetof(Placement, material) == offsetof(Placement, first_index) + 12 &&
+              offsetof(Placement, tangents) == offsetof(Placement, first_index) + 16 &&
+              offsetof(Placement, more_uvs) == offsetof(Placement, tangents) + 12);
 
 template <class D>
 HWY_INLINE Mask<D> PlacementHas(D d, const PlacementLanes<D>& placement, int32_t flag) {
@@ -81,6 +77,47 @@ HWY_INLINE TriangleIndices<D> GatherTriangleIndices(D d, const GeometryView& vie
   return {q.x, q.y, q.z};
 }
 
+/// Where the floats of vertex `i` of the placement's shape begin.
+template <class D>
+HWY_INLINE Int<D> VertexWord(D, const PlacementLanes<D>& placement, Int<D> i) {
+  return hn::ShiftLeft<3>(placement.first_vertex + i);
+}
+inline const float* VertexWords(const GeometryView& view) {
+  return reinterpret_cast<const float*>(view.vertices);
+}
+
+/// A vertex of each lane, in the space of its shape.
+template <class D>
+struct VertexLanes {
+  Vec3<D> position, normal;
+  Vec2<D> uv;
+};
+template <class D>
+HWY_INLINE VertexLanes<D> GatherVertex(D d, const GeometryView& view,
+                                       const PlacementLanes<D>& placement, Int<D> i) {
+  const Oct<D> v = GatherOct(d, VertexWords(view), VertexWord(d, placement, i));
+  return {{v.low.x, v.low.y, v.low.z}, {v.low.w, v.high.x, v.high.y}, {v.high.z, v.high.w}};
+}
+template <class D>
+HWY_INLINE Vec3<D> GatherPosition(D d, const GeometryView& view, const PlacementLanes<D>& placement,
+                                  Int<D> i) {
+  return GatherTriple(d, VertexWords(view), VertexWord(d, placement, i));
+}
+/// For readers of nothing else.
+template <class D>
+HWY_INLINE VertexLanes<D> GatherBareVertex(D d, const GeometryView& view,
+                                           const PlacementLanes<D>& placement, Int<D> i) {
+  const Real<D> zero = hn::Zero(d);
+  return {GatherPosition(d, view, placement, i), {zero, zero, zero}, {zero, zero}};
+}
+template <class D>
+HWY_INLINE Vec2<D> GatherFirstUv(D d, const GeometryView& view, const PlacementLanes<D>& placement,
+                                 Int<D> i) {
+  const Quad<D> rest = GatherQuad(d, VertexWords(view) + 4, VertexWord(d, placement, i));
+  return {rest.z, rest.w};
+}
+static_assert(sizeof(MeshVertex) == 32 && offsetof(MeshVertex, uv) == 24);
+
 /// The rows of a 3x4 matrix.
 template <class D>
 struct Affine {
@@ -99,16 +136,11 @@ HWY_INLINE Vec3<D> TransformPoint(const Affine<D>& m, const Vec3<D>& p) {
   return {row(m.rows[0]), row(m.rows[1]), row(m.rows[2])};
 }
 
-/// The triangle's vertices in world space. Every lane needs a valid placement and primitive.
+/// The triangle of these vertices, from the space of its shape.
 template <class D>
-HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view,
-                                        const PlacementLanes<D>& placement,
-                                        const TriangleIndices<D>& index) {
-  const auto vertex = [&](Int<D> i) HWY_ATTR {
-    return GatherTriple(d, view.floats, placement.positions + i * hn::Set(IntTag<D>(), 3));
-  };
-  Vec3<D> p0 = vertex(index.i0), p1 = vertex(index.i1), p2 = vertex(index.i2);
-
+HWY_INLINE Triangle<D> TriangleToWorld(D d, const GeometryView& view,
+                                       const PlacementLanes<D>& placement, Vec3<D> p0, Vec3<D> p1,
+                                       Vec3<D> p2) {
   const Mask<D> instanced = PlacementHas(d, placement, kPlacementInstanced);
   if (!hn::AllFalse(d, instanced)) {
     // Flat lanes keep their vertices: going through an identity would cost them a rounding of -0.
@@ -120,11 +152,15 @@ HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view,
   return {p0, p1, p2, PlacementHas(d, placement, kPlacementMirrored)};
 }
 
+/// The triangle's vertices in world space. Every lane needs a valid placement and primitive.
 template <class D>
 HWY_INLINE Triangle<D> TriangleVertices(D d, const GeometryView& view, Int<D> placement,
                                         Int<D> primitive) {
   const PlacementLanes<D> lanes = LoadPlacements(d, view.placements, placement);
-  return TriangleVertices(d, view, lanes, GatherTriangleIndices(d, view, lanes, primitive));
+  const TriangleIndices<D> index = GatherTriangleIndices(d, view, lanes, primitive);
+  return TriangleToWorld(d, view, lanes, GatherPosition(d, view, lanes, index.i0),
+                         GatherPosition(d, view, lanes, index.i1),
+                         GatherPosition(d, view, lanes, index.i2));
 }
 
 /// Twice the triangle's area times its geometric normal, on the side that glTF calls the front.

@@ -38,6 +38,18 @@ HWY_INLINE Real<D> LoadBlocks(D d, const float* HWY_RESTRICT base, const int32_t
   }
 }
 
+/// base[at[k]], ... base[at[k] + 3] for lane k of four or more.
+template <class D>
+HWY_INLINE Quad<D> LoadQuad(D d, const float* HWY_RESTRICT base, const int32_t* at) {
+  // Block k of `a` is the record of lane 4 k, of `b` that of lane 4 k + 1, and so on.
+  const Real<D> a = LoadBlocks(d, base, at), b = LoadBlocks(d, base, at + 1),
+                c = LoadBlocks(d, base, at + 2), e = LoadBlocks(d, base, at + 3);
+  const Real<D> ac_low = hn::InterleaveLower(d, a, c), be_low = hn::InterleaveLower(d, b, e);
+  const Real<D> ac_high = hn::InterleaveUpper(d, a, c), be_high = hn::InterleaveUpper(d, b, e);
+  return {hn::InterleaveLower(d, ac_low, be_low), hn::InterleaveUpper(d, ac_low, be_low),
+          hn::InterleaveLower(d, ac_high, be_high), hn::InterleaveUpper(d, ac_high, be_high)};
+}
+
 /// base[index], base[index + 1], ... base[index + 3]; `index` counts floats. All four must be
 /// readable in every lane.
 template <class D>
@@ -50,13 +62,24 @@ HWY_INLINE Quad<D> GatherQuad(D d, const float* HWY_RESTRICT base, Int<D> index)
   } else {
     HWY_ALIGN int32_t at[hn::MaxLanes(D())];
     hn::Store(index, di, at);
-    // Block k of `a` is the record of lane 4 k, of `b` that of lane 4 k + 1, and so on.
-    const Real<D> a = LoadBlocks(d, base, at), b = LoadBlocks(d, base, at + 1),
-                  c = LoadBlocks(d, base, at + 2), e = LoadBlocks(d, base, at + 3);
-    const Real<D> ac_low = hn::InterleaveLower(d, a, c), be_low = hn::InterleaveLower(d, b, e);
-    const Real<D> ac_high = hn::InterleaveUpper(d, a, c), be_high = hn::InterleaveUpper(d, b, e);
-    return {hn::InterleaveLower(d, ac_low, be_low), hn::InterleaveUpper(d, ac_low, be_low),
-            hn::InterleaveLower(d, ac_high, be_high), hn::InterleaveUpper(d, ac_high, be_high)};
+    return LoadQuad(d, base, at);
+  }
+}
+
+/// Words 0..7 of a record, one record per lane.
+template <class D>
+struct Oct {
+  Quad<D> low, high;
+};
+/// base[index], ... base[index + 7], as GatherQuad.
+template <class D>
+HWY_INLINE Oct<D> GatherOct(D d, const float* HWY_RESTRICT base, Int<D> index) {
+  if constexpr (hn::MaxLanes(D()) < 4) {
+    return {GatherQuad(d, base, index), GatherQuad(d, base + 4, index)};
+  } else {
+    HWY_ALIGN int32_t at[hn::MaxLanes(D())];
+    hn::Store(index, IntTag<D>(), at);
+    return {LoadQuad(d, base, at), LoadQuad(d, base + 4, at)};
   }
 }
 

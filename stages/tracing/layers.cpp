@@ -27,7 +27,7 @@ bool Before(const LayerHit& a, const LayerHit& b) {
 bool ShareVertex(const GeometryView& g, const Placement& p, uint32_t a, uint32_t b) {
   const auto corner = [&](uint32_t triangle, uint32_t k) {
     const uint32_t vertex = g.indices[static_cast<uint32_t>(p.first_index) + 3 * triangle + k];
-    return g.floats + p.positions + 3 * static_cast<size_t>(vertex);
+    return g.vertices[static_cast<size_t>(p.first_vertex) + vertex].position;
   };
   for (uint32_t i = 0; i < 9; ++i) {
     if (std::memcmp(corner(a, i / 3), corner(b, i % 3), 3 * sizeof(float)) == 0) return true;

@@ -35,7 +35,7 @@ class LoadedCase {
     const stages::GeometryView& g = context().geometry;
     const stages::Placement& p = g.placements[placement];
     const uint32_t vertex = g.indices[static_cast<uint32_t>(p.first_index) + 3 * primitive + k];
-    const float* const at = g.floats + p.positions + 3 * static_cast<size_t>(vertex);
+    const float* const at = g.vertices[static_cast<size_t>(p.first_vertex) + vertex].position;
     return {at[0], at[1], at[2]};
   }
 

@@ -30,8 +30,8 @@ struct LightScene {
     t.radiance_luminance = luminance;
     t.two_sided = two_sided;
     triangles.push_back(t);
-    for (const float c : p) scene.geometry.floats.push_back(c);
     for (int i = 0; i < 3; ++i) {
+      scene.geometry.vertices.push_back({.position = {p[3 * i], p[3 * i + 1], p[3 * i + 2]}});
       scene.geometry.indices.push_back(static_cast<uint32_t>(3 * t.primitive + i));
     }
   }
@@ -46,8 +46,7 @@ struct LightScene {
   }
   void Build() {
     scene.geometry.placements.resize(1);
-    scene.geometry.floats.resize(scene.geometry.floats.size() + 4);  // kernels load 16 bytes
-    scene.geometry.indices.resize(scene.geometry.indices.size() + 1);
+    scene.geometry.indices.resize(scene.geometry.indices.size() + 1);  // kernels load 16 bytes
     render::BuildLightTree(scene, triangles, punctual);
     view = LightViewOf(scene);
   }

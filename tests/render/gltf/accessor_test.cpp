@@ -97,8 +97,7 @@ TEST(Accessor, ReadsInterleavedViews) {
   scene.AddMesh({{"attributes", {{"POSITION", 0}, {"NORMAL", 1}}}});
   const ImportedScene imported = Load(scene);
   EXPECT_THAT(Positions(imported), ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0));
-  EXPECT_THAT(Stream(imported, 0, imported.geometry.shapes[0].normals, 3),
-              ElementsAre(0, 0, 1, 0, 0, 1, 0, 0, 1));
+  EXPECT_THAT(Normals(imported), ElementsAre(0, 0, 1, 0, 0, 1, 0, 0, 1));
 }
 
 Json SparsePart(SceneBuilder& scene, const std::vector<uint16_t>& indices,

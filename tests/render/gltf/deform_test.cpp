@@ -49,7 +49,7 @@ TEST(Morph, NormalsMoveToo) {
       scene.AddAccessor<float>("VEC3", {3, 0, 3, 0, 0, 0, 0, 0, -2});
   scene.json["meshes"][0]["weights"] = {1, 0};
   const ImportedScene imported = Load(scene);
-  const std::vector<float> normals = Stream(imported, 0, imported.geometry.shapes[0].normals, 3);
+  const std::vector<float> normals = Normals(imported);
   EXPECT_FLOAT_EQ(normals[0], 0.6f);
   EXPECT_FLOAT_EQ(normals[2], 0.8f);
   EXPECT_EQ(normals[8], -1);

@@ -83,18 +83,22 @@ fs::path ModelFile(const std::string& name) {
 /// What must hold of any import: every index and reference in range, every float finite.
 void ExpectSound(const ImportedScene& scene) {
   const stages::GeometryTables& tables = scene.geometry;
-  EXPECT_TRUE(std::all_of(tables.floats.begin(), tables.floats.end(),
-                          [](float x) { return std::isfinite(x); }));
+  const auto finite = [](float x) { return std::isfinite(x); };
+  EXPECT_TRUE(std::all_of(tables.floats.begin(), tables.floats.end(), finite));
+  for (const stages::MeshVertex& v : tables.vertices) {
+    ASSERT_TRUE(std::all_of(v.position, v.position + 3, finite));
+    ASSERT_TRUE(std::all_of(v.uv, v.uv + 2, finite));
+  }
   for (const stages::Shape& shape : tables.shapes) {
     for (int i = 0; i < shape.triangle_count * 3; ++i) {
       ASSERT_LT(tables.indices.at(shape.first_index + i),
                 static_cast<uint32_t>(shape.vertex_count));
     }
-    ASSERT_LE(static_cast<size_t>(shape.positions + 3 * shape.vertex_count), tables.floats.size());
+    ASSERT_LE(static_cast<size_t>(shape.first_vertex + shape.vertex_count), tables.vertices.size());
     ASSERT_LT(static_cast<size_t>(shape.material), scene.materials.size());
-    for (int v = 0; v < (shape.normals == stages::kNone ? 0 : shape.vertex_count); ++v) {
-      const float* n = &tables.floats[shape.normals + 3 * v];
-      ASSERT_NEAR(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], 1, 1e-5);
+    for (int v = 0; v < shape.vertex_count; ++v) {
+      const float* n = tables.vertices[shape.first_vertex + v].normal;
+      ASSERT_NEAR(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], shape.smooth ? 1 : 0, 1e-5);
     }
     for (int v = 0; v < (shape.tangents == stages::kNone ? 0 : shape.vertex_count); ++v) {
       const float* t = &tables.floats[shape.tangents + 4 * v];
@@ -228,7 +232,7 @@ double SignedVolume(const ImportedScene& scene, const stages::MeshInstance& inst
     gltf::Vec3 corners[3];
     for (int c = 0; c < 3; ++c) {
       const uint32_t vertex = tables.indices[shape.first_index + 3 * t + c];
-      const float* p = &tables.floats[shape.positions + 3 * vertex];
+      const float* p = tables.vertices[shape.first_vertex + vertex].position;
       const gltf::Vec3 world = gltf::TransformPoint(instance.object_to_world, {p[0], p[1], p[2]});
       corners[c] = gltf::Subtract(world, eye);
     }

@@ -70,9 +70,10 @@ TEST(Primitive, MissingNormalsStayFlat) {
   scene.AddTriangle();
   const ImportedScene imported = Load(scene);
   const stages::Shape& shape = imported.geometry.shapes.at(0);
-  EXPECT_EQ(shape.normals, kNone);
+  EXPECT_FALSE(shape.smooth);
   EXPECT_EQ(shape.tangents, kNone);
-  EXPECT_EQ(shape.uvs, kNone);
+  EXPECT_EQ(shape.uv_sets, 0);
+  EXPECT_EQ(shape.more_uvs, kNone);
   EXPECT_EQ(shape.colors, kNone);
   EXPECT_EQ(shape.triangle_count, 1);
   EXPECT_EQ(shape.vertex_count, 3);
@@ -84,8 +85,7 @@ TEST(Primitive, NormalsAreMadeUnitLength) {
   scene.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] =
       scene.AddAccessor<float>("VEC3", {0, 0, 3, 0, 1e-30f, 0, 1e30f, 0, 0});
   const ImportedScene imported = Load(scene);
-  EXPECT_THAT(Stream(imported, 0, imported.geometry.shapes[0].normals, 3),
-              ElementsAre(0, 0, 1, 0, 1, 0, 1, 0, 0));
+  EXPECT_THAT(Normals(imported), ElementsAre(0, 0, 1, 0, 1, 0, 1, 0, 0));
 }
 
 TEST(Primitive, NormalsWithoutDirectionAreThoseOfTheFaces) {
@@ -96,8 +96,7 @@ TEST(Primitive, NormalsWithoutDirectionAreThoseOfTheFaces) {
       scene.AddAccessor<float>("VEC3", {0, 0, 0, nan, 0, 1, 1, 0, 0});
   std::vector<std::string> warnings;
   const ImportedScene imported = Load(scene, Collect(warnings));
-  EXPECT_THAT(Stream(imported, 0, imported.geometry.shapes[0].normals, 3),
-              ElementsAre(0, 0, 1, 0, 0, 1, 1, 0, 0));
+  EXPECT_THAT(Normals(imported), ElementsAre(0, 0, 1, 0, 0, 1, 1, 0, 0));
   EXPECT_THAT(warnings, SizeIs(1));
 }
 
@@ -107,8 +106,7 @@ TEST(Primitive, AZeroNormalOfATriangleWithoutAreaIsUp) {
   const int normals = scene.AddAccessor<float>("VEC3", std::vector<float>(9, 0.0f));
   scene.AddMesh({{"attributes", {{"POSITION", positions}, {"NORMAL", normals}}}});
   const ImportedScene imported = Load(scene);
-  EXPECT_THAT(Stream(imported, 0, imported.geometry.shapes[0].normals, 3),
-              ElementsAre(0, 0, 1, 0, 0, 1, 0, 0, 1));
+  EXPECT_THAT(Normals(imported), ElementsAre(0, 0, 1, 0, 0, 1, 0, 0, 1));
 }
 
 /// A quad with TEXCOORD_0 and _2, whose material reads the sets given.
@@ -132,22 +130,21 @@ TEST(Primitive, KeepsOnlyTheUvSetsThatItsMaterialReads) {
   const ImportedScene one = Load(QuadWithSets({2}));
   EXPECT_EQ(one.geometry.shapes[0].uv_sets, 1);
   EXPECT_EQ(one.slots.at(0).uv_set, 0);
-  EXPECT_THAT(Stream(one, 0, one.geometry.shapes[0].uvs, 2),
-              ElementsAre(10, 11, 12, 13, 14, 15, 16, 17));
+  EXPECT_THAT(FirstUvs(one), ElementsAre(10, 11, 12, 13, 14, 15, 16, 17));
 
   const ImportedScene two = Load(QuadWithSets({2, 0}));
   EXPECT_EQ(two.geometry.shapes[0].uv_sets, 2);
   EXPECT_EQ(two.slots.at(0).uv_set, 0);
   EXPECT_EQ(two.slots.at(1).uv_set, 1);
-  EXPECT_THAT(Stream(two, 0, two.geometry.shapes[0].uvs, 4),
-              ElementsAre(10, 11, 0, 1, 12, 13, 1, 1, 14, 15, 1, 0, 16, 17, 0, 0));
+  EXPECT_THAT(FirstUvs(two), ElementsAre(10, 11, 12, 13, 14, 15, 16, 17));
+  EXPECT_THAT(Stream(two, 0, two.geometry.shapes[0].more_uvs, 2),
+              ElementsAre(0, 1, 1, 1, 1, 0, 0, 0));
 }
 
 TEST(Primitive, AMissingUvSetIsZeroWithAWarning) {
   std::vector<std::string> warnings;
   const ImportedScene imported = Load(QuadWithSets({5}), Collect(warnings));
-  EXPECT_THAT(Stream(imported, 0, imported.geometry.shapes[0].uvs, 2),
-              ElementsAre(0, 0, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(FirstUvs(imported), ElementsAre(0, 0, 0, 0, 0, 0, 0, 0));
   ASSERT_THAT(warnings, SizeIs(1));
   EXPECT_THAT(warnings[0], HasSubstr("TEXCOORD_5"));
 }
@@ -168,7 +165,7 @@ TEST(Primitive, PrimitivesOverTheSameAccessorsShareTheirStreams) {
   EXPECT_EQ(imported.geometry.shapes[0].material, 2);  // the default one, after the file's two
   EXPECT_EQ(imported.geometry.shapes[1].material, 0);
   EXPECT_EQ(imported.geometry.shapes[2].material, 1);
-  EXPECT_EQ(imported.geometry.shapes[1].positions, imported.geometry.shapes[2].positions);
+  EXPECT_EQ(imported.geometry.shapes[1].first_vertex, imported.geometry.shapes[2].first_vertex);
   EXPECT_THAT(imported.materials, SizeIs(3));
 }
 

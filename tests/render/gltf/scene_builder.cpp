@@ -202,8 +202,30 @@ std::vector<float> Stream(const ImportedScene& scene, int shape, int offset, int
   return {begin, begin + scene.geometry.shapes[shape].vertex_count * per_vertex};
 }
 
+namespace {
+template <size_t kCount>
+std::vector<float> OfVertices(const ImportedScene& scene, int index,
+                              float (stages::MeshVertex::*field)[kCount]) {
+  const stages::Shape& shape = scene.geometry.shapes[index];
+  std::vector<float> values;
+  for (int v = 0; v < shape.vertex_count; ++v) {
+    const auto& of = scene.geometry.vertices[shape.first_vertex + v].*field;
+    values.insert(values.end(), std::begin(of), std::end(of));
+  }
+  return values;
+}
+}  // namespace
+
 std::vector<float> Positions(const ImportedScene& scene, int shape) {
-  return Stream(scene, shape, scene.geometry.shapes[shape].positions, 3);
+  return OfVertices(scene, shape, &stages::MeshVertex::position);
+}
+std::vector<float> Normals(const ImportedScene& scene, int shape) {
+  if (!scene.geometry.shapes[shape].smooth) return {};
+  return OfVertices(scene, shape, &stages::MeshVertex::normal);
+}
+std::vector<float> FirstUvs(const ImportedScene& scene, int shape) {
+  if (scene.geometry.shapes[shape].uv_sets == 0) return {};
+  return OfVertices(scene, shape, &stages::MeshVertex::uv);
 }
 
 }  // namespace carpool::render

@@ -108,8 +108,11 @@ ImportedScene Load(const SceneBuilder& scene, const LoadOptions& options = {});
 std::string ErrorOf(const std::filesystem::path& path, const LoadOptions& options = {});
 std::string ErrorOf(const SceneBuilder& scene, const LoadOptions& options = {});
 
-/// The positions, or another stream, of a shape as floats.
-std::vector<float> Stream(const ImportedScene& scene, int shape, int offset, int per_vertex);
+/// What the vertices of a shape have, as floats; empty where the shape has no such thing.
 std::vector<float> Positions(const ImportedScene& scene, int shape = 0);
+std::vector<float> Normals(const ImportedScene& scene, int shape = 0);
+std::vector<float> FirstUvs(const ImportedScene& scene, int shape = 0);
+/// Another stream, which is in `floats`.
+std::vector<float> Stream(const ImportedScene& scene, int shape, int offset, int per_vertex);
 
 }  // namespace carpool::render

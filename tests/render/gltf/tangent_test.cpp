@@ -237,7 +237,7 @@ TEST(Tangent, AFlatMeshGetsTangentsAndStaysFlat) {
   // Given tangents are ignored there, as the specification says.
   const ImportedScene imported = Load(NormalMapped(false, std::vector<float>(16, 0.5f)));
   const stages::Shape& shape = imported.geometry.shapes.at(0);
-  EXPECT_EQ(shape.normals, stages::kNone);
+  EXPECT_FALSE(shape.smooth);
   EXPECT_EQ(shape.vertex_count, 6);
   EXPECT_THAT(Stream(imported, 0, shape.tangents, 4),
               ElementsAre(1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1));
