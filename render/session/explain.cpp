@@ -1,9 +1,11 @@
 // Follows one path and writes down what happens to it.
 #include "render/session/explain.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <span>
 
 #include "render/session/workspace.h"
 #include "stages/executors/camera_group.h"
@@ -167,13 +169,12 @@ std::string ExplainSample(const RenderSettings& settings, const SampleName& name
                                        std::to_string(context.height) + " pixels");
     }
     const stages::FlushDenormals denormals;
-    std::array<PathState, 8> paths;
-    TraceCameraGroup(context, workspace.kernels().wide.camera,
-                     {x / stages::kGroupWidth * stages::kGroupWidth,
-                      y / stages::kGroupHeight * stages::kGroupHeight, name.sample},
-                     paths.data(), 0);
-    PathState& path =
-        paths[y % stages::kGroupHeight * stages::kGroupWidth + x % stages::kGroupWidth];
+    stages::CameraGroup group =
+        TraceCameraGroup(context, workspace.kernels().wide.camera,
+                         {x / stages::kGroupWidth * stages::kGroupWidth,
+                          y / stages::kGroupHeight * stages::kGroupHeight, name.sample});
+    PathState& path = *std::ranges::find(std::span(group.paths).first(group.count),
+                                         y * context.width + x, &PathState::pixel);
     Story story(context, path);
     context.probe = story.probe();
     const stages::OpacityQuery opacity{&context, workspace.kernels().opacity};

@@ -110,11 +110,10 @@ void Barriers::Distribute(std::vector<uint32_t>& slots) {
 }
 
 void Barriers::StartPacket(const CameraPacket& packet, const uint32_t* slots, RayCounts& rays) {
-  std::array<PathState, 8> started;
-  const CameraGroup group = TraceCameraGroup(c_, camera_, packet, started.data(), 0);
+  const CameraGroup group = TraceCameraGroup(c_, camera_, packet);
   for (size_t i = 0; i < 8; ++i) step_[slots[i]] = kIdle;
-  for (size_t i = 0; i < group.count; ++i) {
-    paths_[slots[i]] = started[group.slots[i]];
+  for (uint32_t i = 0; i < group.count; ++i) {
+    paths_[slots[i]] = group.paths[i];
     step_[slots[i]] = AfterTrace(paths_[slots[i]]);
   }
   rays.camera += group.count;

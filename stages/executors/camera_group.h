@@ -1,4 +1,5 @@
-// The camera rays of one packet, made and traced: how executors without a stage graph start paths.
+// Camera rays of packets: gathered for all executors; made, traced and begun for those without a
+// stage graph.
 #pragma once
 
 #include <array>
@@ -9,29 +10,39 @@
 
 namespace carpool::stages {
 
-using CameraKernel = void (*)(const KernelContext&, PathState*, std::span<const uint32_t>);
+static_assert(kCameraGroup == kGroupWidth * kGroupHeight);
 
-/// Which of eight consecutive slots hold the paths of a packet: those whose pixel is in the image.
+/// Adds the group of `packet`, whose first pixel is in the image; the pixels outside idle.
+inline void AddGroup(const KernelContext& c, const CameraPacket& packet, CameraRays& rays) {
+  for (uint32_t i = 0; i < kCameraGroup; ++i) {
+    const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
+    const bool inside = x < c.width && y < c.height;
+    const uint32_t place = rays.count + i;
+    rays.pixel[place] = inside ? y * c.width + x : packet.y * c.width + packet.x;
+    rays.sample[place] = packet.sample;
+    rays.inside[place] = inside ? -1 : 0;
+  }
+  rays.count += kCameraGroup;
+}
+
+/// The paths of a packet whose pixel is in the image.
 struct CameraGroup {
-  std::array<uint32_t, 8> slots;
-  size_t count = 0;
+  std::array<PathState, kCameraGroup> paths;
+  uint32_t count = 0;
 };
 
-/// Starts the paths of `packet` in paths[first] to paths[first + 7] and finds their first hits. The
-/// packet is traced as a whole, whoever asks: its hits do not depend on the executor.
+/// Starts the paths of `packet`, with their first hits. It is traced as a whole, whoever asks: its
+/// hits do not depend on the executor.
 inline CameraGroup TraceCameraGroup(const KernelContext& c, CameraKernel camera,
-                                    const CameraPacket& packet, PathState* paths, uint32_t first) {
+                                    const CameraPacket& packet) {
+  CameraRays rays;
+  AddGroup(c, packet, rays);
+  camera(c, rays);
+  IntersectCameraRays(c.trace, rays);
   CameraGroup group;
-  std::array<PathState*, 8> traced = {};
-  EachPixel(packet, c.width, c.height, [&](uint32_t i, uint32_t pixel) {
-    const uint32_t slot = first + i;
-    paths[slot].pixel = pixel;
-    paths[slot].sample = packet.sample;
-    traced[i] = &paths[slot];
-    group.slots[group.count++] = slot;
-  });
-  camera(c, paths, {group.slots.data(), group.count});
-  IntersectPacket(c.trace, traced.data());
+  for (uint32_t i = 0; i < kCameraGroup; ++i) {
+    if (rays.inside[i] != 0) StartPath(rays, i, group.paths[group.count++]);
+  }
   return group;
 }
 

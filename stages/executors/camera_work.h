@@ -32,15 +32,6 @@ struct CameraPacket {
   uint32_t sample;
 };
 
-/// Calls visit(lane, pixel) for the pixels (y * width + x) of a packet that are in the image.
-template <class Visit>
-void EachPixel(const CameraPacket& packet, uint32_t width, uint32_t height, const Visit& visit) {
-  for (uint32_t i = 0; i < kGroupWidth * kGroupHeight; ++i) {
-    const uint32_t x = packet.x + i % kGroupWidth, y = packet.y + i / kGroupWidth;
-    if (x < width && y < height) visit(i, y * width + x);
-  }
-}
-
 /// The phase of the group whose first pixel is (x, y), by its place among the 4 x 8 groups of its
 /// tile. The coordinates' bits are interleaved in reverse, so that the first 2^k phases are always
 /// an even grid.

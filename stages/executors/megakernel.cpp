@@ -33,15 +33,14 @@ class Megakernel final : public Executor {
 };
 
 void Megakernel::RenderPacket(const CameraPacket& packet, RayCounts& rays) const {
-  std::array<PathState, 8> paths;
-  const CameraGroup group = TraceCameraGroup(c_, camera_, packet, paths.data(), 0);
+  CameraGroup group = TraceCameraGroup(c_, camera_, packet);
   rays.camera += group.count;
   const auto count = [&rays](PathStep step, const PathState&) {
     rays.shadow += step == PathStep::shadowed ? 1 : 0;
     rays.bounce += step == PathStep::traced ? 1 : 0;
   };
   for (size_t i = 0; i < group.count; ++i) {
-    PathState& path = paths[group.slots[i]];
+    PathState& path = group.paths[i];
     FollowPath(c_, kernels_, opacity_, path, count);
     c_.film->Add(path.pixel, path.sample, path.radiance);
   }

@@ -71,11 +71,10 @@ void Recursive::Radiance(PathState& path, RayCounts& rays) const {
 }
 
 void Recursive::RenderPacket(const CameraPacket& packet, RayCounts& rays) const {
-  std::array<PathState, 8> paths;
-  const CameraGroup group = TraceCameraGroup(c_, camera_, packet, paths.data(), 0);
+  CameraGroup group = TraceCameraGroup(c_, camera_, packet);
   rays.camera += group.count;
   for (size_t i = 0; i < group.count; ++i) {
-    PathState& path = paths[group.slots[i]];
+    PathState& path = group.paths[i];
     Radiance(path, rays);
     c_.film->Add(path.pixel, path.sample, path.radiance);
   }

@@ -95,13 +95,12 @@ void Reference::RenderPacket(const CameraPacket& packet, Tally& tally) const {
   silent.first_hits = false;
   KernelContext c = c_;
   c.probe = &probe;
-  std::array<PathState, 8> paths;
-  const CameraGroup group = TraceCameraGroup(silent, kernels_.wide.camera, packet, paths.data(), 0);
+  CameraGroup group = TraceCameraGroup(silent, kernels_.wide.camera, packet);
   const OpacityQuery single_opacity{&c_, kernels_.opacity}, opacity{&c_, &ReferenceOpacity};
   PathRecorder single(probe), reference(probe);
   tally.rays.camera += group.count;
   for (size_t i = 0; i < group.count; ++i) {
-    PathState& path = paths[group.slots[i]];
+    PathState& path = group.paths[i];
     single.Clear();
     FollowPath(silent, kernels_.one, single_opacity, path, single);
 

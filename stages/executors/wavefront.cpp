@@ -2,9 +2,11 @@
 // depth.
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <vector>
 
 #include "stages/executors/binning.h"
+#include "stages/executors/camera_group.h"
 #include "stages/executors/executor.h"
 #include "stages/executors/partition.h"
 #include "stages/executors/slot_pool.h"
@@ -18,8 +20,8 @@ using Slot = uint32_t;
 constexpr uint32_t kMaxBatch = 65536;
 // So many packets, and paths, of a batch at a time: what one step leaves of them is in the
 // first-level cache for the next.
-constexpr size_t kPacketsAtOnce = 8;
-constexpr size_t kPathsAtOnce = 8 * kPacketsAtOnce;
+constexpr size_t kPathsAtOnce = CameraRays::kMost;
+constexpr size_t kPacketsAtOnce = kPathsAtOnce / kCameraGroup;
 
 struct alignas(64) WorkerTally {
   RayCounts rays;
@@ -86,12 +88,16 @@ class Wavefront final : public Executor {
   void CameraKernel(const Batch<CameraPacket>& batch, Emitter& out);
   void StartPaths(std::span<const CameraPacket> packets, uint32_t worker, WorkerTally& tally,
                   Emitter& out);
+  void EndRays(CameraRays& rays, std::span<const uint32_t> places);
   void IntersectKernel(const Batch<Slot>& batch, Emitter& out);
   void ShadeKernel(const Batch<Slot>& batch, Emitter& out);
   void ShadowKernel(const Batch<Slot>& batch, Emitter& out);
   void MissKernel(const Batch<Slot>& batch, Emitter& out);
   void FilmKernel(const Batch<Slot>& batch);
 
+  enum Fate { kIdle, kMissed, kHit };
+  using ByFate = Partition<3, CameraRays::kMost>;
+  static ByFate SplitByFate(const CameraRays& rays);
   using ByHit = Partition<2, kPathsAtOnce>;
   ByHit SplitByHit(std::span<const Slot> slots) const;
   void EmitHits(std::span<const Slot> slots, Emitter& out) const;
@@ -203,34 +209,44 @@ void Wavefront::CameraKernel(const Batch<CameraPacket>& batch, Emitter& out) {
 
 void Wavefront::StartPaths(std::span<const CameraPacket> packets, uint32_t worker,
                            WorkerTally& tally, Emitter& out) {
-  std::array<Slot, kPathsAtOnce> taken;
-  size_t count = 0;
-  for (const CameraPacket& packet : packets)
-    EachPixel(packet, c_.width, c_.height, [&](uint32_t, uint32_t) { ++count; });
-  const std::span<Slot> slots(taken.data(), count);
+  CameraRays rays;
+  for (const CameraPacket& packet : packets) AddGroup(c_, packet, rays);
+  kernels_.camera(c_, rays);
+  IntersectCameraRays(c_.trace, rays);
+  const ByFate by_fate = SplitByFate(rays);
+  const std::span<const uint32_t> missed = by_fate.List(kMissed), hit = by_fate.List(kHit);
+  tally.rays.camera += missed.size() + hit.size();
+  if (!missed.empty()) EndRays(rays, missed);
+
+  std::array<Slot, CameraRays::kMost> taken;
+  const std::span<Slot> slots = std::span(taken).first(hit.size());
   pool_.Take(worker, slots);
-  size_t next = 0;
-  for (const CameraPacket& packet : packets) {
-    EachPixel(packet, c_.width, c_.height, [&](uint32_t, uint32_t pixel) {
-      PathState& path = paths_[slots[next++]];
-      path.pixel = pixel;
-      path.sample = packet.sample;
-    });
+  for (size_t i = 0; i < hit.size(); ++i) StartPath(rays, hit[i], paths_[slots[i]]);
+  EmitHits(slots, out);
+}
+
+/// The places of traced camera rays by what becomes of them.
+Wavefront::ByFate Wavefront::SplitByFate(const CameraRays& rays) {
+  static constexpr auto kPlaces = [] {
+    std::array<uint32_t, CameraRays::kMost> places;
+    std::iota(places.begin(), places.end(), 0u);
+    return places;
+  }();
+  return {std::span(kPlaces).first(rays.count), [&](uint32_t place, size_t) {
+            return rays.inside[place] == 0 ? kIdle : rays.placement[place] < 0 ? kMissed : kHit;
+          }};
+}
+
+/// To the film, with what they see of the background.
+void Wavefront::EndRays(CameraRays& rays, std::span<const uint32_t> places) {
+  for (const uint32_t place : places) c_.film->Prefetch(rays.pixel[place], rays.sample[place]);
+  kernels_.background(c_, rays);
+  FilmAccumulator::Writer film(*c_.film);
+  for (const uint32_t place : places) {
+    const float radiance[3] = {rays.radiance[0][place], rays.radiance[1][place],
+                               rays.radiance[2][place]};
+    film.Add(rays.pixel[place], rays.sample[place], radiance);
   }
-  kernels_.camera(c_, paths_.data(), slots);
-  next = 0;
-  for (const CameraPacket& packet : packets) {
-    std::array<PathState*, 8> group = {};
-    EachPixel(packet, c_.width, c_.height,
-              [&](uint32_t i, uint32_t) { group[i] = &paths_[slots[next++]]; });
-    IntersectPacket(c_.trace, group.data());
-  }
-  tally.rays.camera += count;
-  // What sees the background ends at once, while its state is near: two queues less.
-  const ByHit by_hit = SplitByHit(slots);
-  if (has_environment_) kernels_.miss(c_, paths_.data(), by_hit.List(0));
-  EndPaths(by_hit.List(0), worker);
-  EmitHits(by_hit.List(1), out);
 }
 
 void Wavefront::IntersectKernel(const Batch<Slot>& batch, Emitter& out) {

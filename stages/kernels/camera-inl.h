@@ -11,7 +11,6 @@
 #endif
 
 #include "stages/kernels/kernels.h"
-#include "stages/kernels/path-inl.h"
 #include "stages/sampling/filter-inl.h"
 #include "stages/sampling/sobol-inl.h"
 
@@ -40,13 +39,15 @@ HWY_INLINE Vec2<D> ImagePlanePoint(D d, const KernelContext& c, Uint<D> pixel,
           hn::NegMulAdd(y, Splat(d, 2.0 / c.height), Splat(d, 1))};
 }
 
+/// One ray per lane. Rays of one camera have the same cone.
 template <class D>
-HWY_INLINE void CameraLanes(D d, const KernelContext& c, const PathLanes<D>& p) {
-  const UintTag<D> du;
-  const Quad<D> names = PathQuad(d, p, offsetof(PathState, pixel));  // pixel, sample, ...
-  const Uint<D> pixel = hn::BitCast(du, names.x), sample = hn::BitCast(du, names.y);
+struct CameraRay {
+  Vec3<D> origin, direction;
+};
+template <class D>
+HWY_INLINE CameraRay<D> MakeCameraRay(D d, const KernelContext& c, Uint<D> pixel, Uint<D> sample) {
   const SampleKey<D> key = MakeSampleKey(d, pixel, sample, c.seed);
-  const Vec2<D> u = Sample2D(d, key, hn::Zero(du), Purpose::camera_filter);
+  const Vec2<D> u = Sample2D(d, key, hn::Zero(UintTag<D>()), Purpose::camera_filter);
   const Vec2<D> plane = ImagePlanePoint(d, c, pixel, SamplePixelFilter(d, u));
 
   const float* m = c.camera.world_from_camera;
@@ -54,30 +55,18 @@ HWY_INLINE void CameraLanes(D d, const KernelContext& c, const PathLanes<D>& p) 
                         HWY_ATTR { return Splat3(d, m[column], m[4 + column], m[8 + column]); };
   const Real<D> x = plane.x * Splat(d, c.camera.half_width);
   const Real<D> y = plane.y * Splat(d, c.camera.half_height);
-  const double pixel_extent = 2.0 * c.camera.half_height / c.height;
   const Vec3<D> sideways = MulAdd(axis(0), x, Scale(axis(1), y));
+  if (c.camera.orthographic != 0) return {Add<D>(axis(3), sideways), Neg<D>(axis(2))};
+  return {axis(3), Normalize(d, Sub<D>(sideways, axis(2)))};
+}
 
-  Vec3<D> origin = axis(3), direction;
-  Real<D> width = hn::Zero(d), spread = hn::Zero(d);
-  if (c.camera.orthographic != 0) {
-    origin = Add<D>(origin, sideways);
-    direction = Neg<D>(axis(2));
-    width = Splat(d, pixel_extent);
-  } else {
-    direction = Normalize(d, Sub<D>(sideways, axis(2)));
-    spread = Splat(d, pixel_extent);
-  }
-
-  const PathTargets<D> to(d, p, p.active);
-  const Real<D> zero = hn::Zero(d);
-  const Real<D> one = Splat(d, 1);
-  StoreQuad(d, to, offsetof(PathState, origin), origin.x, origin.y, origin.z, zero);  // tnear
-  StoreQuad(d, to, offsetof(PathState, direction), direction.x, direction.y, direction.z,
-            zero);  // pdf
-  StoreQuad(d, to, offsetof(PathState, throughput), one, one, one, width);
-  StoreQuad(d, to, offsetof(PathState, radiance), zero, zero, zero, spread);
-  StoreWord(d, to, offsetof(PathState, flags), zero);
-  StoreWord(d, to, offsetof(PathState, shadow_distance), zero);
+/// Width at the origin (metres) and growth per metre of the cone that is one pixel.
+struct CameraCone {
+  double width, spread;
+};
+inline CameraCone ConeOf(const KernelContext& c) {
+  const double extent = 2.0 * c.camera.half_height / c.height;
+  return c.camera.orthographic != 0 ? CameraCone{extent, 0} : CameraCone{0, extent};
 }
 
 }  // namespace carpool::stages::HWY_NAMESPACE

@@ -23,13 +23,60 @@ void Check(const char* kernel, const PathState* paths, std::span<const uint32_t>
   }
 }
 
-template <class D>
-void Camera(const KernelContext& c, PathState* paths, std::span<const uint32_t> slots) {
-  const D d;
-  for (size_t i = 0; i < slots.size(); i += hn::Lanes(d)) {
-    CameraLanes(d, c, LoadSlots(d, paths, slots.data() + i, slots.size() - i));
+void Check(const char* kernel, const CameraRays& rays) {
+  if constexpr (kCheckOutputs) {
+    for (uint32_t i = 0; i < rays.count; ++i) {
+      if (rays.inside[i] == 0) continue;
+      PathState path;
+      StartPath(rays, i, path);
+      for (int channel = 0; channel < 3; ++channel)
+        path.radiance[channel] = rays.radiance[channel][i];
+      CheckOutput(kernel, path);
+    }
   }
-  Check("camera", paths, slots);
+}
+
+template <class D>
+Vec3<D> LoadTriple(D d, const float (&from)[3][CameraRays::kMost], size_t i) {
+  return {hn::LoadU(d, from[0] + i), hn::LoadU(d, from[1] + i), hn::LoadU(d, from[2] + i)};
+}
+template <class D>
+void StoreTriple(D d, const Vec3<D>& v, float (&to)[3][CameraRays::kMost], size_t i) {
+  hn::StoreU(v.x, d, to[0] + i);
+  hn::StoreU(v.y, d, to[1] + i);
+  hn::StoreU(v.z, d, to[2] + i);
+}
+static_assert(CameraRays::kMost % hn::MaxLanes(Wide()) == 0);
+
+template <class D>
+void Camera(const KernelContext& c, CameraRays& rays) {
+  const D d;
+  const UintTag<D> du;
+  const CameraCone cone = ConeOf(c);
+  rays.cone_width = static_cast<float>(cone.width);
+  rays.cone_spread = static_cast<float>(cone.spread);
+  for (size_t i = 0; i < rays.count; i += hn::Lanes(d)) {
+    const CameraRay<D> ray =
+        MakeCameraRay(d, c, hn::LoadU(du, rays.pixel + i), hn::LoadU(du, rays.sample + i));
+    StoreTriple(d, ray.origin, rays.origin, i);
+    StoreTriple(d, ray.direction, rays.direction, i);
+    StoreTriple(d, Splat3(d, 0, 0, 0), rays.radiance, i);
+  }
+  Check("camera", rays);
+}
+
+template <class D>
+void Background(const KernelContext& c, CameraRays& rays) {
+  if (c.lights.environment.width == 0) return;
+  const D d;
+  const IntTag<D> di;
+  for (size_t i = 0; i < rays.count; i += hn::Lanes(d)) {
+    const auto missed = hn::Lt(hn::LoadU(di, rays.placement + i), hn::Zero(di));
+    if (hn::AllFalse(di, missed)) continue;
+    StoreTriple(d, EnvironmentRadiance(d, c.lights.environment, LoadTriple(d, rays.direction, i)),
+                rays.radiance, i);
+  }
+  Check("background", rays);
 }
 
 template <class D>
@@ -55,7 +102,7 @@ float OpacityAt(const void* context, int32_t placement, uint32_t primitive, floa
 
 template <class D>
 KernelSet MakeSet() {
-  return {static_cast<int>(hn::Lanes(D())), &Camera<D>, &Shade<D>, &Miss<D>};
+  return {static_cast<int>(hn::Lanes(D())), &Camera<D>, &Background<D>, &Shade<D>, &Miss<D>};
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "stages/film/accumulator.h"
 #include "stages/tables/bsdf_tables.h"
 #include "stages/tables/camera.h"
+#include "stages/tables/camera_rays.h"
 #include "stages/tables/geometry_view.h"
 #include "stages/tables/light_view.h"
 #include "stages/tables/materials.h"
@@ -56,16 +57,21 @@ struct KernelContext {
 /// Where a path goes next.
 enum class Next : uint8_t { film, shadow, trace };
 
-/// One width of the kernels. Each handles `slots` of `paths`; masked lanes touch nothing.
+using CameraKernel = void (*)(const KernelContext&, CameraRays& rays);
+
+/// One width of the kernels. Those of paths handle `slots` of `paths`; masked lanes touch nothing.
 struct KernelSet {
   int lanes = 1;
-  /// Starts paths: pixel and sample are set in each slot, the rest is written.
-  void (*camera)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots);
+  /// Makes the rays of the pixels and samples that are set, with no radiance.
+  CameraKernel camera;
+  /// Sets the radiance of traced camera rays that hit nothing to the environment's.
+  void (*background)(const KernelContext&, CameraRays& rays);
   /// Shades surface hits: emission, next-event estimation, BSDF sampling, roulette; or passes
   /// through a transparent layer. Writes the way of each slot to `next`.
   void (*shade)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots,
                 Next* next);
-  /// Adds the environment to paths that left the scene; they end.
+  /// Adds the environment to paths that left the scene; they end. One that has only its camera ray
+  /// behind it gets what `background` gives, bit for bit.
   void (*miss)(const KernelContext&, PathState* paths, std::span<const uint32_t> slots);
 };
 

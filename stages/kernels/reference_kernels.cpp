@@ -20,6 +20,11 @@ using Vector = Vec3<hn::OneDouble>;
 Vector VectorOf(const double v[3]) {
   return {{v[0]}, {v[1]}, {v[2]}};
 }
+void StoreVector(const Vector& v, double to[3]) {
+  to[0] = v.x.v;
+  to[1] = v.y.v;
+  to[2] = v.z.v;
+}
 
 /// Barycentrics and distance where `direction` from `origin` meets the plane of `t`; false if it
 /// runs along the plane.
@@ -51,11 +56,25 @@ void Refine(const KernelContext& c, ReferencePath& path) {
   path.distance = distance;
 }
 
+void StartCamera(const KernelContext& c, ReferencePath& path) {
+  const auto name = [](uint64_t v) { return hn::Lane<uint32_t>{static_cast<uint32_t>(v)}; };
+  const CameraRay<hn::OneDouble> ray = MakeCameraRay(kTag, c, name(path.pixel), name(path.sample));
+  const CameraCone cone = ConeOf(c);
+  StoreVector(ray.origin, path.origin);
+  StoreVector(ray.direction, path.direction);
+  std::fill_n(path.throughput, 3, 1.0);
+  std::fill_n(path.radiance, 3, 0.0);
+  path.tnear = path.pdf = path.shadow_distance = 0;
+  path.cone_width = cone.width;
+  path.cone_spread = cone.spread;
+  path.flags = 0;
+}
+
 }  // namespace N_DOUBLE
 
 void ReferenceCamera(const KernelContext& c, ReferencePath& path) {
   const FloatTraps traps;
-  N_DOUBLE::CameraLanes(N_DOUBLE::kTag, c, N_DOUBLE::OnlyPath(N_DOUBLE::kTag, &path));
+  N_DOUBLE::StartCamera(c, path);
 }
 
 Next ReferenceShade(const KernelContext& c, ReferencePath& path) {

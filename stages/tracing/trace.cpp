@@ -138,10 +138,33 @@ struct PacketHits {
   alignas(16) int32_t placement[kSize];
 
   PacketHits() { SetCommon<kSize>(rays.ray); }
-  void Trace(const TraceLevel& level, const Packet<kSize>& packet, Coherence coherence) {
+
+  /// Finds the nearest hits of the rays, whose origins, directions and beginnings are set.
+  void Find(const TraceView& view, const int* valid, Coherence coherence) {
+    std::fill_n(rays.ray.tfar, kSize, kInfinity);
+    std::fill_n(rays.hit.primID, kSize, 0u);  // of rays that miss: unread, but copied
+    std::fill_n(rays.hit.u, kSize, 0.0f);
+    std::fill_n(rays.hit.v, kSize, 0.0f);
+    std::fill_n(placement, kSize, kNone);
+    if (view.opaque.scene != nullptr) {
+      Trace(view.opaque, valid, coherence);
+      for (int i = 0; i < kSize; ++i)
+        placement[i] = PlacementOf(view.opaque, rays.hit.instID[0][i], rays.hit.geomID[i]);
+    }
+    if (view.transparent.scene != nullptr) {
+      Trace(view.transparent, valid, coherence);
+      for (int i = 0; i < kSize; ++i) {
+        if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+        placement[i] = PlacementOf(view.transparent, rays.hit.instID[0][i], rays.hit.geomID[i]);
+      }
+    }
+  }
+
+ private:
+  void Trace(const TraceLevel& level, const int* valid, Coherence coherence) {
     std::fill_n(rays.hit.geomID, kSize, RTC_INVALID_GEOMETRY_ID);
     std::fill_n(rays.hit.instID[0], kSize, RTC_INVALID_GEOMETRY_ID);
-    EmbreeIntersect<kSize>(packet.valid, level.scene, &rays, coherence);
+    EmbreeIntersect<kSize>(valid, level.scene, &rays, coherence);
   }
 };
 
@@ -175,32 +198,6 @@ void StoreHits(const PacketHits<kSize>& hits, const Packet<kSize>& packet) {
 static_assert(offsetof(PathState, distance) == offsetof(PathState, primitive) + 12 &&
               offsetof(PathState, shadow_distance) == offsetof(PathState, first_layer) + 12);
 
-/// Finds the nearest hits of the packet's rays.
-template <int kSize>
-void IntersectPacket(const TraceView& view, const Packet<kSize>& packet, Coherence coherence,
-                     PacketHits<kSize>& hits) {
-  auto& rays = hits.rays;
-  SetRays(rays.ray, packet, offsetof(PathState, direction), rays.ray.tfar);
-  std::fill_n(rays.ray.tfar, kSize, kInfinity);  // over what is behind the direction
-  std::fill_n(rays.hit.primID, kSize, 0u);  // of rays that miss: nobody reads it, but it is copied
-  std::fill_n(rays.hit.u, kSize, 0.0f);
-  std::fill_n(rays.hit.v, kSize, 0.0f);
-  std::fill_n(hits.placement, kSize, kNone);
-  if (view.opaque.scene != nullptr) {
-    hits.Trace(view.opaque, packet, coherence);
-    for (int i = 0; i < packet.count; ++i)
-      hits.placement[i] = PlacementOf(view.opaque, rays.hit.instID[0][i], rays.hit.geomID[i]);
-  }
-  if (view.transparent.scene != nullptr) {
-    hits.Trace(view.transparent, packet, coherence);
-    for (int i = 0; i < packet.count; ++i) {
-      if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-      hits.placement[i] = PlacementOf(view.transparent, rays.hit.instID[0][i], rays.hit.geomID[i]);
-    }
-  }
-  StoreHits(hits, packet);
-}
-
 template <int kSize>
 void IntersectSlots(const TraceView& view, PathState* paths, std::span<const uint32_t> slots) {
   Packet<kSize> packet;
@@ -216,7 +213,10 @@ void IntersectSlots(const TraceView& view, PathState* paths, std::span<const uin
     if (packet.count < kSize && i + 1 < slots.size()) continue;
     if (packet.count == 0) return;
     packet.Close();
-    IntersectPacket(view, packet, Coherence::incoherent, hits);
+    auto& rays = hits.rays.ray;  // what is behind a direction is overwritten
+    SetRays(rays, packet, offsetof(PathState, direction), rays.tfar);
+    hits.Find(view, packet.valid, Coherence::incoherent);
+    StoreHits(hits, packet);
     unsigned same = 0;
     for (int k = 0; k < packet.count; ++k) {
       const bool again =
@@ -314,15 +314,25 @@ void IntersectPaths(const TraceView& view, PathState* paths, std::span<const uin
   WithPacketSize(view.packet_size, [&](auto size) { IntersectSlots<size()>(view, paths, slots); });
 }
 
-void IntersectPacket(const TraceView& view, PathState* const paths[8]) {
-  Packet<8> packet;
-  for (int i = 0; i < 8; ++i) {
-    if (paths[i] != nullptr) packet.Add(*paths[i]);
+void IntersectCameraRays(const TraceView& view, CameraRays& rays) {
+  PacketHits<kCameraGroup> hits;
+  RTCRay8& ray = hits.rays.ray;
+  const RTCHit8& hit = hits.rays.hit;
+  std::fill_n(ray.tnear, kCameraGroup, 0.0f);
+  float* const origin[3] = {ray.org_x, ray.org_y, ray.org_z};
+  float* const direction[3] = {ray.dir_x, ray.dir_y, ray.dir_z};
+  for (uint32_t first = 0; first < rays.count; first += kCameraGroup) {
+    for (int c = 0; c < 3; ++c) {
+      std::copy_n(rays.origin[c] + first, kCameraGroup, origin[c]);
+      std::copy_n(rays.direction[c] + first, kCameraGroup, direction[c]);
+    }
+    hits.Find(view, rays.inside + first, Coherence::coherent);
+    std::copy_n(hits.placement, kCameraGroup, rays.placement + first);
+    std::copy_n(hit.primID, kCameraGroup, rays.primitive + first);
+    std::copy_n(hit.u, kCameraGroup, rays.u + first);
+    std::copy_n(hit.v, kCameraGroup, rays.v + first);
+    std::copy_n(ray.tfar, kCameraGroup, rays.distance + first);
   }
-  if (packet.count == 0) return;
-  packet.Close();
-  PacketHits<8> hits;
-  IntersectPacket(view, packet, Coherence::coherent, hits);
 }
 
 void TraceShadow(const TraceView& view, const OpacityQuery& opacity, PathState& path) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "stages/tables/camera_rays.h"
 #include "stages/tables/geometry_view.h"
 #include "stages/tables/path.h"
 #include "stages/tracing/embree.h"
@@ -46,10 +47,10 @@ void IntersectPath(const TraceView& view, PathState& path);
 /// get, because packets that are not COHERENT go through the same arithmetic as single rays.
 void IntersectPaths(const TraceView& view, PathState* paths, std::span<const uint32_t> slots);
 
-/// Eight camera rays of a fixed 4x2 pixel group, as one coherent packet. Null entries are skipped.
+/// Finds the nearest hits of camera rays: each group of a fixed 4x2 pixels is one coherent packet.
 /// Within a packet, mates can change each other's hits in the last bit; groups are therefore the
 /// same in every executor.
-void IntersectPacket(const TraceView& view, PathState* const paths[8]);
+void IntersectCameraRays(const TraceView& view, CameraRays& rays);
 
 /// Traces the path's shadow ray and adds its contribution, times what transparent layers let
 /// through.

@@ -1,4 +1,5 @@
-// The executors' parts: which packets a pass hands out, how slots go round, how bins are coarsened.
+// The executors' parts: which packets a pass hands out, how rays are gathered, how slots go round,
+// how bins are coarsened.
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "stages/executors/binning.h"
+#include "stages/executors/camera_group.h"
 #include "stages/executors/camera_work.h"
 #include "stages/executors/slot_pool.h"
 #include "stages/kernels/check_outputs.h"
@@ -54,6 +56,29 @@ TEST(CameraWork, PhasesPartitionThePass) {
   }
   EXPECT_EQ(all.size(), 16u * 32);
   for (const auto& [key, count] : all) EXPECT_EQ(count, 1);
+}
+
+TEST(CameraRays, PlacesOutsideTheImageIdle) {
+  KernelContext c;
+  c.width = 6;
+  c.height = 3;
+  CameraRays rays;
+  AddGroup(c, {0, 0, 7}, rays);
+  AddGroup(c, {4, 2, 8}, rays);  // of 4x2 pixels the upper left two are in the image
+  ASSERT_EQ(rays.count, 2 * kCameraGroup);
+  std::set<uint32_t> first;
+  for (uint32_t i = 0; i < kCameraGroup; ++i) {
+    EXPECT_EQ(rays.inside[i], -1);
+    EXPECT_EQ(rays.sample[i], 7u);
+    first.insert(rays.pixel[i]);
+  }
+  EXPECT_EQ(first, (std::set<uint32_t>{0, 1, 2, 3, 6, 7, 8, 9}));
+  for (uint32_t i = 0; i < kCameraGroup; ++i) {
+    const uint32_t place = kCameraGroup + i;
+    EXPECT_EQ(rays.inside[place], i < 2 ? -1 : 0);
+    EXPECT_EQ(rays.sample[place], 8u);
+    EXPECT_EQ(rays.pixel[place], i == 1 ? 17u : 16u);  // idle ones repeat the first
+  }
 }
 
 using Tile = std::pair<uint32_t, uint32_t>;

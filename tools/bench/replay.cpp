@@ -7,13 +7,16 @@
 #include <array>
 #include <chrono>
 #include <limits>
+#include <numeric>
 
+#include "stages/executors/camera_group.h"
 #include "stages/simd/denormals.h"
 #include "stages/tracing/packet_size.h"
 
 namespace carpool::tools {
 namespace {
 
+using stages::CameraRays;
 using stages::KernelContext;
 using stages::Next;
 using stages::PathState;
@@ -25,34 +28,38 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 class Window {
  public:
   Window(const KernelContext& c, const stages::Kernels& kernels, RayLog& log)
-      : c_(c), kernels_(kernels), opacity_{&c, kernels.opacity}, log_(log), paths_(kWindow + 8) {}
+      : c_(c), kernels_(kernels), opacity_{&c, kernels.opacity}, log_(log), paths_(kWindow) {}
 
   void Add(const stages::CameraPacket& packet) {
-    for (uint32_t i = 0; i < 8; ++i) {
-      const uint32_t x = packet.x + i % stages::kGroupWidth, y = packet.y + i / stages::kGroupWidth;
-      const bool inside = x < c_.width && y < c_.height;
-      paths_[count_].pixel = inside ? y * c_.width + x : 0;
-      paths_[count_].sample = packet.sample;
-      ++count_;
+    stages::AddGroup(c_, packet, rays_);
+    if (rays_.count == CameraRays::kMost) Trace();
+    if (count_ + CameraRays::kMost > kWindow) Follow();
+  }
+
+  void Finish() {
+    if (rays_.count > 0) Trace();
+    Follow();
+  }
+
+ private:
+  void Trace() {
+    kernels_.wide.camera(c_, rays_);
+    log_.camera.push_back(rays_);
+    stages::IntersectCameraRays(c_.trace, rays_);
+    for (uint32_t i = 0; i < rays_.count; ++i) {
+      if (rays_.inside[i] != 0) StartPath(rays_, i, paths_[count_++]);
     }
-    if (count_ + 8 > kWindow) Follow();
+    rays_.count = 0;
   }
 
   void Follow() {
     std::vector<uint32_t> active(count_);
-    for (uint32_t i = 0; i < count_; ++i) active[i] = i;
-    if (count_ > 0) kernels_.wide.camera(c_, paths_.data(), active);
-    for (uint32_t i = 0; i + 8 <= count_; i += 8) {
-      std::array<PathState*, 8> group;
-      for (uint32_t k = 0; k < 8; ++k) group[k] = &paths_[i + k];
-      log_.camera.insert(log_.camera.end(), paths_.begin() + i, paths_.begin() + i + 8);
-      stages::IntersectPacket(c_.trace, group.data());
-    }
+    std::iota(active.begin(), active.end(), 0u);
     while (!active.empty()) active = Wave(active);
+    log_.samples += count_;
     count_ = 0;
   }
 
- private:
   std::vector<uint32_t> Wave(const std::vector<uint32_t>& active) {
     std::vector<uint32_t> hits, on;
     for (const uint32_t slot : active) {
@@ -88,6 +95,7 @@ class Window {
   const stages::Kernels& kernels_;
   stages::OpacityQuery opacity_;
   RayLog& log_;
+  CameraRays rays_;  // that are still to be traced
   std::vector<PathState> paths_;
   uint32_t count_ = 0;
 };
@@ -228,14 +236,14 @@ RayLog RecordRays(const KernelContext& context, const stages::Kernels& kernels, 
                           {.first_sample = 0, .sample_count = samples});
   while (work.Claim(0, 1024, [&](const stages::CameraPacket& packet) { window.Add(packet); })) {
   }
-  window.Follow();
+  window.Finish();
   return log;
 }
 
 double Replay(const stages::TraceView& view, const RayLog& log, const ReplayWay& way,
               tbb::task_arena& arena) {
   std::vector<RecordedRay> bounce = log.bounce, shadow = log.shadow;
-  std::vector<PathState> camera = log.camera;
+  std::vector<CameraRays> camera = log.camera;
   const auto begin = std::chrono::steady_clock::now();
   arena.execute([&] {
     const auto in_chunks = [](size_t count, size_t chunk, const auto& body) {
@@ -244,12 +252,8 @@ double Replay(const stages::TraceView& view, const RayLog& log, const ReplayWay&
         body(i * chunk, std::min(count, (i + 1) * chunk));
       });
     };
-    in_chunks(camera.size() / 8, 64, [&](size_t first, size_t last) {
-      for (size_t p = first; p < last; ++p) {
-        std::array<PathState*, 8> group;
-        for (size_t k = 0; k < 8; ++k) group[k] = &camera[p * 8 + k];
-        stages::IntersectPacket(view, group.data());
-      }
+    in_chunks(camera.size(), 8, [&](size_t first, size_t last) {
+      for (size_t i = first; i < last; ++i) stages::IntersectCameraRays(view, camera[i]);
     });
     constexpr size_t kSortWindow = size_t{1} << 18;
     for (std::vector<RecordedRay>* rays : {&bounce, &shadow}) {

@@ -17,10 +17,10 @@ struct RecordedRay {
 /// Rays of one pass in the order of waves: all camera rays of a window of paths, their shadow rays,
 /// their bounces, and so on.
 struct RayLog {
-  std::vector<stages::PathState>
-      camera;  // groups of 8 that are one packet; empty places have width 0 directions
+  std::vector<stages::CameraRays> camera;
+  uint64_t samples = 0;  // camera rays
   std::vector<RecordedRay> bounce, shadow;
-  uint64_t total() const { return camera.size() + bounce.size() + shadow.size(); }
+  uint64_t total() const { return samples + bounce.size() + shadow.size(); }
 };
 
 /// Follows every path of samples [0, samples) with the kernels of `set`, on the calling thread.

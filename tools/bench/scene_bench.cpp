@@ -131,7 +131,7 @@ void MeasureRounds(const BenchOptions& o, render::Workspace& w, render::Workspac
   f.robust_price = Median(price);
   f.shading_gain = Median(gain);
   const FilmPrice film = MeasureFilmPrice(w.context().width, w.context().height, *options.arena);
-  const double samples = static_cast<double>(log.camera.size());
+  const double samples = static_cast<double>(log.samples);
   f.film_price = (film.exact - film.floats) * 1e-9 * samples / (Median(wave.seconds) * f.threads);
   f.scheduler_share = Median(share);
   f.idle_share = Median(idle);
